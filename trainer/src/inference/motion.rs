@@ -11,20 +11,20 @@ const FRAMES_WITHOUT_RETRY: usize = 15;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RetryPolicy {
     crossings: usize,
-    tears: usize,
+    excess_strain: usize,
 }
 
 impl RetryPolicy {
-    const NONE: Self = Self { crossings: 0, tears: 0 };
-    const ALL: Self = Self { crossings: usize::MAX, tears: usize::MAX };
+    const NONE: Self = Self { crossings: 0, excess_strain: 0 };
+    const ALL: Self = Self { crossings: usize::MAX, excess_strain: usize::MAX };
 
-    /// After a frame of which starting anew left these: tears must not grow from frame to frame.
+    /// After a frame of which starting anew left these: excess strain must not grow from frame to frame.
     fn after(anew: &Certificate) -> Self {
-        Self { crossings: usize::MAX, tears: anew.tears().saturating_add(1) }
+        Self { crossings: usize::MAX, excess_strain: anew.excess_strain().saturating_add(1) }
     }
 
     pub fn is_met(self, certificate: &Certificate) -> bool {
-        certificate.crossings() <= self.crossings && certificate.tears() <= self.tears
+        certificate.crossings() <= self.crossings && certificate.excess_strain() <= self.excess_strain
     }
 }
 

@@ -4,13 +4,13 @@ use std::time::Instant;
 
 use super::body::{Body, with_body, with_drawn};
 use super::budget::Budget;
-use super::close_in::ClosingIn;
+use super::clearance::Clearance;
 use super::count::certified;
 use super::garment::{at, check};
 use super::obstacle::BodyObstacle;
-use super::relief::Room;
 use super::untangle::{Untangled, untangled};
-use super::{Layer, ResolveError, ResolveSettings, Resolved, ease, passed_near};
+use super::withdrawal::ClearanceWithdrawal;
+use super::{Layer, ResolveError, ResolveSettings, Resolved, passed_near, strain_relaxation};
 use crate::query::Surface;
 
 /// How what is left is tried once more: gap and rings, as multiples of those asked for. A smaller gap is for many sheets in one
@@ -45,18 +45,18 @@ pub(super) fn resolved_further<E: From<ResolveError>>(
         let mut found = simply_resolved(&drawn, layers, settings, budget);
         if found.certificate.is_clear() {
             found.go_on(body, layers, settings, budget);
-            found.ease(&drawn, layers, settings, budget, ease::TIMES);
+            found.relax_strain(&drawn, layers, settings, budget, strain_relaxation::TIMES);
         } else {
-            let relieving = Instant::now();
-            found = with_body(drawn, layers.len(), |room| {
-                budget.count_body(relieving);
-                found.certificate.count_narrow(&room.drawn);
+            let yielding_since = Instant::now();
+            found = with_body(drawn, layers.len(), |yielding| {
+                budget.count_body(yielding_since);
+                found.certificate.count_narrow(&yielding.drawn);
                 if found.certificate.between() <= most {
-                    found.yield_to_cloth(room, layers, settings, budget);
+                    found.yield_to_cloth(yielding, layers, settings, budget);
                 }
                 found.go_on(body, layers, settings, budget);
-                let mut found = further(room, found, budget)?;
-                found.ease(&room.drawn, layers, settings, budget, ease::TIMES);
+                let mut found = further(yielding, found, budget)?;
+                found.relax_strain(&yielding.drawn, layers, settings, budget, strain_relaxation::TIMES);
                 Ok::<_, E>(found)
             })?;
         }
@@ -78,11 +78,11 @@ fn resolved_once(
         budget.count_body(preparing);
         let mut found = simply_resolved(&drawn, layers, settings, budget);
         if !found.certificate.is_clear() {
-            let relieving = Instant::now();
-            with_body(drawn, layers.len(), |room| {
-                budget.count_body(relieving);
-                found.certificate.count_narrow(&room.drawn);
-                found.yield_to_cloth(room, layers, settings, budget);
+            let yielding_since = Instant::now();
+            with_body(drawn, layers.len(), |yielding| {
+                budget.count_body(yielding_since);
+                found.certificate.count_narrow(&yielding.drawn);
+                found.yield_to_cloth(yielding, layers, settings, budget);
             });
         }
         found
@@ -112,7 +112,7 @@ impl Resolved {
     ) {
         if !budget.is_spent() {
             let found = untangled(body.obstacle(), layers, settings, budget);
-            let found = settled(body, layers, found, settings, Room::AMPLE, budget);
+            let found = settled(body, layers, found, settings, Clearance::AMPLE, budget);
             self.prefer(layers, found.positions, found.certificate);
         }
     }
@@ -148,11 +148,11 @@ pub(super) fn settled(
     layers: &[Layer<'_>],
     found: Untangled,
     settings: &ResolveSettings,
-    room: Room,
+    clearance: Clearance,
     budget: &Budget,
 ) -> Resolved {
     let mut resolved = judged(&body.drawn, layers, found, budget);
-    ClosingIn { body, layers, room, budget }.improve(&mut resolved, settings);
+    ClearanceWithdrawal { body, layers, clearance, budget }.improve(&mut resolved, settings);
     resolved
 }
 

@@ -236,8 +236,8 @@ impl Certificate {
 
     /// How many times over the strain energy has risen by half of what it was: 0 where cloth is merely pulled straight,
     /// more where it is torn out of shape, which shows.
-    pub fn tears(&self) -> usize {
-        self.strain_added.map_or(0, |added| (added / TEAR) as usize)
+    pub fn excess_strain(&self) -> usize {
+        self.strain_added.map_or(0, |added| (added / EXCESS_STRAIN) as usize)
     }
 
     /// What is wrong.
@@ -245,7 +245,7 @@ impl Certificate {
         Defects {
             intersections: self.crossings(),
             narrow: self.narrow_triangle_pairs,
-            tears: self.tears(),
+            excess_strain: self.excess_strain(),
             self_intersections: self.self_triangle_pairs,
         }
     }
@@ -278,4 +278,4 @@ pub(super) fn strain_joule(layers: &[Layer<'_>]) -> f64 {
 /// Less strain energy than this (J) is rounding of a garment in its rest shape.
 const NO_STRAIN: f64 = 1e-9;
 /// A rise of the strain energy, as a share, from which cloth is torn.
-const TEAR: f64 = 0.5;
+const EXCESS_STRAIN: f64 = 0.5;

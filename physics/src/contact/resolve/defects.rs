@@ -9,7 +9,7 @@ pub struct Defects {
     /// Intersecting triangle pairs with the body where it leaves hardly any clearance for cloth.
     pub narrow: usize,
     /// How many times over the strain energy has risen by half of what it was, where that is known.
-    pub tears: usize,
+    pub excess_strain: usize,
     /// Intersecting triangle pairs of garments with themselves.
     pub self_intersections: usize,
 }

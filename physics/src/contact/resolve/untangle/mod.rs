@@ -8,9 +8,9 @@ use super::budget::Budget;
 use super::contact::{Contact, Plane};
 use super::defects::Defects;
 use super::detect::Crossings;
+use super::layer_constraint::{LayerConstraint, layer_constraints, outward};
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
-use super::over::{Over, all_over, outward};
 use super::sides::Sides;
 use super::{Layer, ResolveSettings};
 use crate::query::triangle_tree::{KeptTree, TriangleTree};
@@ -46,12 +46,12 @@ pub(super) struct Untangling<'a> {
     planes: Vec<Option<Plane>>,
     /// Directions away from the body; zero where there is none.
     outward: Vec<[f64; 3]>,
-    over: Vec<Over>,
+    over: Vec<LayerConstraint>,
     /// Trees of the garments where they were last looked at.
     trees: Vec<KeptTree>,
     crossings: Crossings,
     /// Crossings of the input's garments with themselves, ascending.
-    known_folds: Vec<(u32, u32)>,
+    known_self_intersections: Vec<(u32, u32)>,
     /// Conditions that all crossings so far asked for: a mended place would be torn again by its neighbours without them.
     remembered: Vec<Contact>,
     /// What tells the order of sheets, where it was known a step before; otherwise the directions away from the body do.
@@ -101,7 +101,7 @@ impl<'a> Untangling<'a> {
             over: Vec::new(),
             trees: (0..outfit.len()).map(|_| KeptTree::default()).collect(),
             crossings: Crossings::new(outfit.faces.len()),
-            known_folds: Vec::new(),
+            known_self_intersections: Vec::new(),
             remembered: Vec::new(),
             sides,
         };
@@ -120,7 +120,7 @@ impl<'a> Untangling<'a> {
     /// with wider limits is kept if it ends with none.
     pub fn run(&mut self) {
         self.detect();
-        self.known_folds.clone_from(&self.crossings.own);
+        self.known_self_intersections.clone_from(&self.crossings.own);
         self.attempt();
         if self.crossings.between() == 0 || self.settings.loosened <= 1.0 || self.budget.is_spent() {
             return;
@@ -129,7 +129,7 @@ impl<'a> Untangling<'a> {
         self.farthest *= self.settings.loosened;
         self.stretch = 1.0 + (self.stretch - 1.0) * self.settings.loosened;
         self.attempt();
-        if self.crossings.between() > 0 || self.crossings.own.len() > self.known_folds.len() {
+        if self.crossings.between() > 0 || self.crossings.own.len() > self.known_self_intersections.len() {
             self.move_to(&positions);
             self.shape = shape;
             self.detect();
@@ -199,7 +199,7 @@ impl<'a> Untangling<'a> {
             .collect();
         let reach = (self.settings.reach, self.watch());
         if self.sides.is_none() {
-            self.over = all_over(outfit, &trees, positions, &self.outward, reach);
+            self.over = layer_constraints(outfit, &trees, positions, &self.outward, reach);
         }
         // What crosses where the body is pinched has no side in the next step.
         let counted = (self.settings.self_contact, self.sides.is_some());
@@ -272,7 +272,7 @@ pub(super) struct Untangled {
     pub crossings: usize,
     /// Pairs with the body, where it gives way too.
     pub with_body: usize,
-    /// Pairs of garments with themselves; on a way pinched ones too.
+    /// Pairs of garments with themselves; where contact orientation is kept pinched ones too.
     pub own: usize,
 }
 

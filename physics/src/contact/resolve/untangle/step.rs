@@ -1,9 +1,9 @@
 //! One round: what crossings and wrong sides ask for, and the relaxation that meets it.
 
 use super::super::contact::{Contact, is_tiny, normal_of};
-use super::super::folds::part_folds;
-use super::super::over::{Order, order, part_along, part_from_body};
+use super::super::layer_constraint::{Order, order, part_along, part_from_body};
 use super::super::relax::{LastPasses, no_farther, relax};
+use super::super::self_intersections::part_self_intersections;
 use super::Untangling;
 use crate::vec3::{add, add_scaled, dot, norm, sub};
 
@@ -16,7 +16,7 @@ impl Untangling<'_> {
         let gap = self.settings.gap * (1.0 + 0.1 * round as f64).min(3.0);
         let outfit = self.outfit;
         let (mut asked, crumpled) = match self.sides {
-            None => self.part_folds(0.25 * gap),
+            None => self.part_self_intersections(0.25 * gap),
             Some(_) => (Vec::new(), self.folded()),
         };
         let mut seeds: Vec<u32> = asked.iter().flat_map(|c| c.vertices).chain(crumpled).collect();
@@ -106,7 +106,7 @@ impl Untangling<'_> {
     }
 
     /// Conditions that part crossings of garments with themselves, and crumpled vertices, which are smoothed.
-    fn part_folds(&mut self, gap: f64) -> (Vec<Contact>, Vec<u32>) {
+    fn part_self_intersections(&mut self, gap: f64) -> (Vec<Contact>, Vec<u32>) {
         let (mut contacts, mut folded) = (Vec::new(), Vec::new());
         for &(f, g) in &self.crossings.own {
             let (one, other) = (self.outfit.faces[f as usize], self.outfit.faces[g as usize]);
@@ -118,9 +118,9 @@ impl Untangling<'_> {
             }
         }
         let before = self.positions.clone();
-        let pairs = (folded.as_slice(), self.known_folds.as_slice());
+        let pairs = (folded.as_slice(), self.known_self_intersections.as_slice());
         let smoothed = (self.positions.as_mut_slice(), self.shape.as_mut_slice());
-        let (more, crumpled) = part_folds(self.outfit, pairs, gap, &before, smoothed);
+        let (more, crumpled) = part_self_intersections(self.outfit, pairs, gap, &before, smoothed);
         contacts.extend(more);
         (contacts, crumpled)
     }

@@ -1,44 +1,44 @@
-//! A way that garments are taken, step by step: which steps are tried, and what is done at each.
+//! A path that garments are taken, step by step: which steps are tried, and what is done at each.
 
 use std::sync::OnceLock;
 
 use super::attempt::{FEW, settled};
 use super::body::{Body, with_body_after, with_drawn};
 use super::budget::Budget;
+use super::clearance::{Before, Clearance};
 use super::garment::{at, check};
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
-use super::relief::{Before, Room};
 use super::sides::Sides;
-use super::strides::Strides;
+use super::step_lengths::StepLengths;
 use super::untangle::{Untangled, untangled, untangled_keeping};
 use super::{Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved};
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
 
-/// The rest of the way is one step where, since nothing crossed, so many steps as short as may be left more crossings all the
-/// same: on ways that end clear it is one at most.
+/// The rest of the path is one step where, since nothing crossed, so many steps as short as may be left more crossings all the
+/// same: on paths that end clear it is one at most.
 const FAILURES: usize = 3;
 /// Steps without further crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 4;
 /// How much of what the post-process changed is kept in a long step, so that old changes fade…
 const KEPT: f64 = 0.95;
-/// …and the share of the way from which on a step is long: shorter ones keep more.
+/// …and the share of the path from which on a step is long: shorter ones keep more.
 const FADING: f64 = 1.0 / 16.0;
-/// How much more the body may give way, or less, on a whole way (m): about as fast as limbs move.
+/// How much more the body may give way, or less, on a whole path (m): about as fast as limbs move.
 const GIVING_WAY: f64 = 0.5;
 
 /// Where garments are to be taken.
-pub(super) struct Way<'a, 'b> {
+pub(super) struct Path<'a, 'b> {
     pub layers: &'a [Layer<'a>],
     /// The body at 1.
     pub end: &'a Body<'b>,
     pub settings: &'a ResolveSettings,
     pub budget: &'a Budget,
-    pub strides: Strides,
+    pub step_lengths: StepLengths,
 }
 
-/// Somewhere on the way.
+/// Somewhere on the path.
 struct Place {
     reached: Reached,
     /// How far the body gave way there, per vertex (m); none where that is not known.
@@ -70,9 +70,9 @@ struct Arrived {
     gave_way: Vec<f64>,
 }
 
-impl Way<'_, '_> {
+impl Path<'_, '_> {
     /// Resolves garments in the T-pose and takes them to 1; what comes of it is taken if it is better than the `best` so far.
-    /// Crossings that are there in the T-pose already are not mended on a way.
+    /// Crossings that are there in the T-pose already are not mended on a path.
     pub fn improve<E: From<ResolveError>>(
         &self,
         best: &mut Resolved,
@@ -83,10 +83,13 @@ impl Way<'_, '_> {
             return Ok(());
         }
         let (layers, settings) = (self.layers, self.settings);
-        let first =
-            on_stage(layers, &t_pose, &t_pose.draped, (self.strides.room, None), |obstacle, start| {
-                untangled(obstacle, start, settings, self.budget)
-            });
+        let first = on_stage(
+            layers,
+            &t_pose,
+            &t_pose.draped,
+            (self.step_lengths.clearance, None),
+            |obstacle, start| untangled(obstacle, start, settings, self.budget),
+        );
         let crossings = first.untangled.crossings;
         if crossings > 0 && crossings >= best.certificate.crossings() {
             return Ok(());
@@ -95,7 +98,7 @@ impl Way<'_, '_> {
         let (followed, steps) = self.go(Place::new(t_pose, first, None), most, stage_at)?;
         best.steps += steps;
         let Some(found) = followed else { return Ok(()) };
-        let mut along = settled(self.end, layers, found, settings, self.strides.room, self.budget);
+        let mut along = settled(self.end, layers, found, settings, self.step_lengths.clearance, self.budget);
         along.go_on(self.end.drawn.surface, layers, settings, self.budget);
         best.prefer(layers, along.positions, along.certificate);
         Ok(())
@@ -103,7 +106,7 @@ impl Way<'_, '_> {
 
     /// Takes garments from where they are `reached`, at 0, to the stage at 1; also how many steps were tried. None where the time
     /// is used up, or no step allowed.
-    pub fn follow<E: From<ResolveError>>(
+    pub fn continue_from<E: From<ResolveError>>(
         &self,
         reached: Reached,
         stage_at: impl FnMut(f64) -> Result<PathSample, E>,
@@ -112,14 +115,14 @@ impl Way<'_, '_> {
         self.go(Place { reached, gave_way: None, sides, sides_before: None }, usize::MAX, stage_at)
     }
 
-    /// None, too, where more than `most` pairs intersect on the way.
+    /// None, too, where more than `most` pairs intersect on the path.
     fn go<E: From<ResolveError>>(
         &self,
         mut place: Place,
         most: usize,
         mut stage_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
-        let Strides { longest, shortest, .. } = self.strides;
+        let StepLengths { longest, shortest, .. } = self.step_lengths;
         check(self.end.drawn.surface, &placed(self.layers, &place.reached.draped)?)?;
         check(self.end.drawn.surface, &placed(self.layers, &place.reached.positions)?)?;
         let (mut from, mut step, mut steps) = (0.0, longest, 0);
@@ -160,8 +163,8 @@ impl Way<'_, '_> {
         Ok((None, steps))
     }
 
-    /// Untangles garments at `stage`, `step` of the way after `place`: as at the start of a way, and, where that leaves
-    /// crossings, with the sides that they had before, each as far as the strides allow.
+    /// Untangles garments at `stage`, `step` of the path after `place`: as at the start of a path, and, where that leaves
+    /// crossings, with the sides that they had before, each as far as the step lengths allow.
     fn arrive(
         &self,
         place: &Place,
@@ -177,10 +180,10 @@ impl Way<'_, '_> {
         let kept = KEPT.powf((step / FADING).min(1.0));
         let start = carried(&place.reached, stage, kept);
         check(&stage.body, &placed(self.layers, &start)?)?;
-        let Strides { keeping, keeps_first, room, .. } = self.strides;
+        let StepLengths { keeping, keeps_first, clearance, .. } = self.step_lengths;
         let before = place.gave_way.as_ref().map(|steps| Before { steps, most: GIVING_WAY * step });
         let layers = self.layers;
-        Ok(on_stage(layers, stage, &start, (room, before), |obstacle, start| {
+        Ok(on_stage(layers, stage, &start, (clearance, before), |obstacle, start| {
             let first =
                 (step > keeping || !keeps_first).then(|| untangled(obstacle, start, &settings, self.budget));
             match first {
@@ -201,7 +204,7 @@ fn on_stage(
     layers: &[Layer<'_>],
     stage: &PathSample,
     start: &[Vec<[f64; 3]>],
-    (room, before): (Room, Option<Before<'_>>),
+    (clearance, before): (Clearance, Option<Before<'_>>),
     untangle: impl FnOnce(&BodyObstacle<'_>, &[Layer<'_>]) -> Untangled,
 ) -> Arrived {
     let start = at(layers, start);
@@ -210,7 +213,7 @@ fn on_stage(
         let untangled = untangle(body.obstacle(), &start);
         Arrived { untangled, gave_way: body.steps() }
     };
-    with_drawn(&stage.body, &places, |drawn| with_body_after(room, before, drawn, layers.len(), arrive))
+    with_drawn(&stage.body, &places, |drawn| with_body_after(clearance, before, drawn, layers.len(), arrive))
 }
 
 /// The garments elsewhere, if that is all of them.

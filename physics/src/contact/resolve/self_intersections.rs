@@ -16,7 +16,7 @@ const COUNTED_RINGS: usize = 10;
 
 /// What the crossings of a garment with itself ask for.
 #[derive(Debug, Default)]
-pub(super) struct Folds {
+pub(super) struct PartingConditions {
     /// Conditions that part two sheets.
     pub contacts: Vec<Contact>,
     /// Vertices of crumples, to be smoothed.
@@ -24,8 +24,13 @@ pub(super) struct Folds {
 }
 
 /// Looks at `pairs` of crossing faces (each ascending) at `positions`; sheets are parted by `gap`.
-fn folds(garment: &RestGarment, positions: &[[f64; 3]], pairs: &[(u32, u32)], gap: f64) -> Folds {
-    let mut found = Folds::default();
+fn parting_conditions(
+    garment: &RestGarment,
+    positions: &[[f64; 3]],
+    pairs: &[(u32, u32)],
+    gap: f64,
+) -> PartingConditions {
+    let mut found = PartingConditions::default();
     let faces = &garment.faces;
     let sheets = Sheets::new(garment, pairs);
     let mut crossings: HashMap<(u32, u32), Vec<(u32, u32)>> = HashMap::new();
@@ -61,7 +66,7 @@ fn folds(garment: &RestGarment, positions: &[[f64; 3]], pairs: &[(u32, u32)], ga
 /// Conditions that part `pairs` of faces at `positions`, each of one garment, one garment after the other, and the vertices of
 /// crumples. Those are smoothed (in positions and shape): for good in a garment with a pair that is `known` from the input; in
 /// others what was done to them is taken back.
-pub(super) fn part_folds(
+pub(super) fn part_self_intersections(
     outfit: &Outfit<'_>,
     (pairs, known): (&[(u32, u32)], &[(u32, u32)]),
     gap: f64,
@@ -73,7 +78,7 @@ pub(super) fn part_folds(
         let g = outfit.garment_of_face(pairs[0].0);
         let (first, start) = (outfit.faces_of_garment(g).start, outfit.vertices(g).start);
         let local: Vec<(u32, u32)> = pairs.iter().map(|(f, g)| (f - first, g - first)).collect();
-        let found = folds(outfit.layers[g].garment, outfit.part(positions, g), &local, gap);
+        let found = parting_conditions(outfit.layers[g].garment, outfit.part(positions, g), &local, gap);
         contacts.extend(found.contacts.into_iter().map(|contact| contact.shifted(start)));
         let is_of_input = pairs.iter().any(|pair| known.binary_search(pair).is_ok());
         for v in found.crumpled.into_iter().map(|v| v + start) {
@@ -176,7 +181,7 @@ fn part(
     (f, g): (u32, u32),
     is_below: bool,
     gap: f64,
-    found: &mut Folds,
+    found: &mut PartingConditions,
 ) {
     let (face, other) = (garment.faces[f as usize], garment.faces[g as usize]);
     let (upper, lower) = (face.map(|v| positions[v as usize]), other.map(|v| positions[v as usize]));

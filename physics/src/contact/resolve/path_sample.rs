@@ -1,11 +1,11 @@
-//! A pose on the way to another, and garments that are resolved there.
+//! A pose on the path to another, and garments that are resolved there.
 
 use std::sync::Arc;
 
 use crate::query::Surface;
 use crate::transform::Transform;
 
-/// What is somewhere along the way.
+/// What is somewhere along the path.
 #[derive(Clone)]
 pub struct PathSample {
     /// The body.
@@ -16,7 +16,7 @@ pub struct PathSample {
     pub transforms: Vec<Transform>,
 }
 
-/// Garments that are resolved, as far as they could be: where a way starts.
+/// Garments that are resolved, as far as they could be: where a path starts.
 pub struct Reached {
     /// Their drape before that, `[V, 3]` each (m).
     pub draped: Vec<Vec<[f64; 3]>>,

@@ -42,12 +42,17 @@ fn a_rising_knee_takes_the_sheet_along() {
     let layers = [Layer { garment: &garment, positions: &stage.draped[0] }];
     let settings = ResolveSettings::default();
     let follow = |end: &Body<'_>| {
-        let strides = Strides::FROM_T_POSE;
-        let way =
-            Way { layers: &layers, end, settings: &settings, budget: &Budget::new(&settings, 1), strides };
+        let step_lengths = StepLengths::FROM_T_POSE;
+        let path = Path {
+            layers: &layers,
+            end,
+            settings: &settings,
+            budget: &Budget::new(&settings, 1),
+            step_lengths,
+        };
         let first = stage_at(0.0).unwrap();
         let positions = first.draped.clone();
-        let (followed, steps) = way.follow(untouched(first, positions), &stage_at).unwrap();
+        let (followed, steps) = path.continue_from(untouched(first, positions), &stage_at).unwrap();
         assert!(steps >= 8, "{steps}");
         followed.unwrap()
     };

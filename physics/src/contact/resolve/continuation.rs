@@ -2,18 +2,18 @@
 //!
 //! In a pose with bent limbs the drape alone does not tell where cloth belongs: a knee has gone through a skirt, a
 //! sleeve through the side of the chest, and the nearest way out is the wrong one. In the T-pose nothing of that has
-//! happened. On a way from there each step is short: what was resolved before is carried along by skinning and by what
+//! happened. On a path from there each step is short: what was resolved before is carried along by skinning and by what
 //! the drape changes, crossings are shallow, and the nearest way out is right. Where a step leaves more crossings than
 //! there were, a shorter one is tried.
 
 use super::attempt::{FEW, resolved_further, settled};
 use super::body::{Body, with_body, with_drawn};
 use super::budget::Budget;
-use super::ease::{TIMES, TIMES_IN_FRAME};
 use super::garment::check;
+use super::path::{Path, placed};
 use super::stages::Stages;
-use super::strides::Strides;
-use super::way::{Way, placed};
+use super::step_lengths::StepLengths;
+use super::strain_relaxation::{TIMES, TIMES_IN_FRAME};
 use super::{Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved, Stage};
 use crate::query::Surface;
 use crate::transform::Transform;
@@ -21,7 +21,7 @@ use std::time::Instant;
 
 /// As [`super::resolve`], with a second way out: where crossings of `layers` on `body` cannot be mended, the garments are taken
 /// along from the stage at 0, the T-pose, to the stage at 1, on `body`; what `layers` differ by from the drape there is added
-/// along the way.
+/// along the path.
 ///
 /// # Errors
 /// Those of `stage_at` and of [`super::resolve`].
@@ -37,8 +37,8 @@ pub fn resolve_along<E: From<ResolveError>>(
     let most = if settings.steps > 0 { FEW } else { usize::MAX };
     let along = |end: &Body<'_>, mut best: Resolved, budget: &Budget| {
         if !best.certificate.is_clear() && settings.steps > 0 && !budget.is_spent() {
-            let way = Way { layers, end, settings, budget, strides: Strides::FROM_T_POSE };
-            way.improve(&mut best, stage_at(0.0)?, &mut stage_at)?;
+            let path = Path { layers, end, settings, budget, step_lengths: StepLengths::FROM_T_POSE };
+            path.improve(&mut best, stage_at(0.0)?, &mut stage_at)?;
         }
         Ok::<_, E>(best)
     };
@@ -68,16 +68,18 @@ pub fn resolve_after<E: From<ResolveError>>(
     let preparing = Instant::now();
     let carry_on = |body: &Body<'_>| {
         budget.count_body(preparing);
-        let strides = if before.crossings == 0 { Strides::OF_FRAME } else { Strides::OF_CROSSED_FRAME };
-        let way = Way { layers, end: body, settings, budget, strides };
-        let (followed, steps) = way.follow(before, |share| Ok::<_, E>(checked(stage_at(share)?, layers)?))?;
+        let step_lengths =
+            if before.crossings == 0 { StepLengths::OF_FRAME } else { StepLengths::OF_CROSSED_FRAME };
+        let path = Path { layers, end: body, settings, budget, step_lengths };
+        let (followed, steps) =
+            path.continue_from(before, |share| Ok::<_, E>(checked(stage_at(share)?, layers)?))?;
         let Some(found) = followed else { return Ok(None) };
-        let mut resolved = settled(body, layers, found, settings, strides.room, budget);
+        let mut resolved = settled(body, layers, found, settings, step_lengths.clearance, budget);
         resolved.go_on(body.drawn.surface, layers, settings, budget);
-        resolved.ease(&body.drawn, layers, settings, budget, TIMES_IN_FRAME);
+        resolved.relax_strain(&body.drawn, layers, settings, budget, TIMES_IN_FRAME);
         resolved.compare_since(layers, budget);
-        if resolved.certificate.tears() > 0 {
-            resolved.ease(&body.drawn, layers, settings, budget, TIMES - TIMES_IN_FRAME);
+        if resolved.certificate.excess_strain() > 0 {
+            resolved.relax_strain(&body.drawn, layers, settings, budget, TIMES - TIMES_IN_FRAME);
             resolved.compare_since(layers, budget);
         }
         resolved.steps = steps;
