@@ -128,16 +128,23 @@ impl Resolved {
         budget: &Budget,
     ) {
         let attempts = if settings.loosened > 1.0 { &AGAIN[..] } else { &[] };
-        for (gap, rings) in attempts {
+        let mut now = self.positions.clone();
+        for again in attempts {
             let left = self.certificate.between();
             let is_smooth = !settings.self_contact || self.certificate.self_triangle_pairs <= FEW_OF_ITSELF;
             if left == 0 && is_smooth || left > FEW || budget.is_spent() {
                 break;
             }
+            // Self-intersections become fewer from attempt to attempt as they are.
+            let (gap, rings) = if left > 0 { *again } else { (1.0, 1) };
             let settings =
                 ResolveSettings { gap: gap * settings.gap, rings: rings * settings.rings, ..*settings };
-            let found = resolved_once(body, &at(layers, &self.positions), &settings, budget);
+            let found = resolved_once(body, &at(layers, &now), &settings, budget);
+            now.clone_from(&found.positions);
             self.prefer(layers, found.positions, found.certificate);
+            if left > 0 {
+                now.clone_from(&self.positions);
+            }
         }
     }
 }
