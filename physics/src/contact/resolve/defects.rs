@@ -3,8 +3,8 @@
 /// What is wrong with a state. Less is better, compared in the order of the fields.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Defects {
-    /// Intersecting triangle pairs with the body and between garments; while garments are relaxed, vertices on the wrong side,
-    /// too.
+    /// Intersecting triangle pairs with the body and between garments; while garments are relaxed, all pairs and vertices on the
+    /// wrong side.
     pub intersections: usize,
     /// Intersecting triangle pairs with the body where it leaves hardly any clearance for cloth.
     pub narrow: usize,

@@ -162,12 +162,12 @@ impl<'a> Untangling<'a> {
         self.detect();
     }
 
-    /// Pairs that are left, and vertices on the wrong side.
+    /// Pairs that are left, self-intersections included: all are to be parted; and vertices on the wrong side.
     fn defects(&self) -> Defects {
         let wrong = self.planes.iter().flatten().filter(|p| self.is_violated(p, ROUNDS_FOR_GAPS)).count()
             + self.over.iter().filter(|o| o.height < 0.0).count();
         Defects {
-            intersections: self.crossings.between() + wrong,
+            intersections: self.crossings.count() + wrong,
             self_intersections: self.crossings.own.len(),
             ..Defects::default()
         }
