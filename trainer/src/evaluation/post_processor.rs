@@ -11,7 +11,6 @@ use clothcombo_physics::contact::resolve::{
     resolve_along,
 };
 use clothcombo_physics::query::Surface;
-use clothcombo_physics::transform::apply;
 use miette::Diagnostic;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -69,7 +68,6 @@ impl<'a> PostProcessor<'a> {
         Ok(PathSample {
             body: Arc::new(scene.exact_body()),
             draped: wide(&scene, &self.networks.forward(&scene, LayerInteraction::Together)?.posed),
-            skinned: wide(&scene, &skinned(&scene)),
             transforms: scene.skinning_transforms(),
         })
     }
@@ -79,12 +77,6 @@ impl<'a> PostProcessor<'a> {
 fn wide(scene: &PreparedScene, packed: &[[f32; 3]]) -> Vec<Vec<[f64; 3]>> {
     let wide = |part: &[[f32; 3]]| part.iter().map(|p| p.map(f64::from)).collect();
     scene.parts(packed).into_iter().map(wide).collect()
-}
-
-/// Linear blend skinning of the start state on the host, packed: what the networks start from.
-fn skinned(scene: &PreparedScene) -> Vec<[f32; 3]> {
-    let start = scene.bodies[0].start.iter().map(|p| p.map(f64::from));
-    scene.skinning_transforms().iter().zip(start).map(|(t, p)| apply(t, p).map(|x| x as f32)).collect()
 }
 
 /// A scene's body and garments as the post-process takes them.
@@ -111,8 +103,7 @@ impl DrapedScene<'_> {
     /// When it is no valid scene, or another pose cannot be draped.
     pub fn resolved(&self, settings: &ResolveSettings) -> Result<Resolved, PostProcessError> {
         let stage_at = |share: f64| self.post_processor.stage(self.scene, share);
-        let skinned = wide(self.scene, &skinned(self.scene));
-        resolve_along(&self.body, &self.layers(), &skinned, settings, stage_at)
+        resolve_along(&self.body, &self.layers(), settings, stage_at)
     }
 
     /// Whether the order of the garments is feasible ([`infeasible_pair`]).

@@ -134,7 +134,7 @@ impl Draper {
                 _ => stage,
             })
         };
-        let anew = resolve_along(surface, &layers, &outfit.to_parts(&made.skinned), settings, from_t_pose)?;
+        let anew = resolve_along(surface, &layers, settings, from_t_pose)?;
         // What carries on does not pop.
         Ok(match carried {
             Some(carried) => carried.or(anew),

@@ -12,20 +12,20 @@ const FRAMES_WITHOUT_RETRY: usize = 15;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RetryPolicy {
     crossings: usize,
-    tears: usize,
+    excess_strain: usize,
 }
 
 impl RetryPolicy {
-    const NONE: Self = Self { crossings: 0, tears: 0 };
-    const ALL: Self = Self { crossings: usize::MAX, tears: usize::MAX };
+    const NONE: Self = Self { crossings: 0, excess_strain: 0 };
+    const ALL: Self = Self { crossings: usize::MAX, excess_strain: usize::MAX };
 
-    /// After a frame of which starting anew left these: tears must not grow from frame to frame.
+    /// After a frame of which starting anew left these: excess strain must not grow from frame to frame.
     fn after(anew: &Certificate) -> Self {
-        Self { crossings: usize::MAX, tears: anew.tears().saturating_add(1) }
+        Self { crossings: usize::MAX, excess_strain: anew.excess_strain().saturating_add(1) }
     }
 
     pub fn is_met(self, certificate: &Certificate) -> bool {
-        certificate.crossings() <= self.crossings && certificate.tears() <= self.tears
+        certificate.crossings() <= self.crossings && certificate.excess_strain() <= self.excess_strain
     }
 }
 
@@ -95,7 +95,7 @@ impl Draper {
                 let mut again =
                     self.drape_frame(outfit, Frame { body, refine, last: Some(last) }, made, &mut watch)?;
                 again.slim();
-                if again.certificate.flaws() < own.certificate.flaws() {
+                if again.certificate.defects() < own.certificate.defects() {
                     std::mem::swap(own, &mut again);
                 }
                 own.milliseconds += again.milliseconds;
@@ -120,7 +120,7 @@ fn carry_back<T, E>(
         let (own, after) = frames.split_at_mut(frame + 1);
         let (own, after) = (&mut own[frame], &after[0]);
         let (now, next) = (certificate(own), certificate(after));
-        if next.flaws() < now.flaws() && next.crossings() == 0 {
+        if !RetryPolicy::NONE.is_met(now) && next.defects() < now.defects() && next.crossings() == 0 {
             again(frame, own, after)?;
         }
     }

@@ -42,7 +42,6 @@ impl NetworkDrape {
         PathSample {
             body: self.surface.clone(),
             draped: outfit.to_parts(&self.network),
-            skinned: outfit.to_parts(&self.skinned),
             transforms: self.transforms.clone(),
         }
     }

@@ -1,82 +1,64 @@
 //! Attempts: the first one, those on a body that gives way, and those that begin where another one ended.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::body::{Body, with_body, with_drawn};
 use super::budget::Budget;
-use super::close_in::ClosingIn;
+use super::clearance::Clearance;
 use super::count::certified;
-use super::garment::at;
+use super::garment::{at, check};
 use super::obstacle::BodyObstacle;
-use super::relief::Room;
-use super::unfold::Folds;
 use super::untangle::{Untangled, untangled};
-use super::{GarmentWork, Layer, ResolveSettings, Resolved, ease};
+use super::withdrawal::ClearanceWithdrawal;
+use super::{Layer, ResolveError, ResolveSettings, Resolved, passed_near, strain_relaxation};
 use crate::query::Surface;
 
-/// Most attempts that begin where another one ended…
-const FURTHER_ATTEMPTS: usize = 3;
-/// …and most pairs that may be left there: more would only be torn further.
+/// How what is left is tried once more: gap and rings, as multiples of those asked for. A smaller gap is for many sheets in one
+/// crease, a larger one goes round what holds a few of them.
+const AGAIN: [(f64, usize); 3] = [(1.0, 1), (0.3, 1), (3.0, 2)];
+/// Most pairs that may be left for that: more would only be torn further.
 pub(super) const FEW: usize = 32;
-/// Most pairs for which the body gives way before a path is tried: more are hardly ever cleared by that.
-const MOST_TO_YIELD: usize = 64;
 /// Pairs of garments with themselves that may be left where nothing else crosses.
 pub(super) const FEW_OF_ITSELF: usize = 8;
-/// How the last few crossings are tried once more: gap and rings, as shares of those asked for. A smaller gap is for
-/// many sheets in one crease, a larger one goes round what holds a few of them.
-const LAST: [(f64, usize); 2] = [(0.3, 1), (3.0, 2)];
 
-/// [`super::resolve`] for valid arguments. Where something is left to do after the first attempt, `further` may go on from there: it
-/// gets the body and what was reached. The body only gives way before that where few enough pairs are left.
-pub(super) fn resolved_further<E>(
+/// The fast pass and, of what it does not clear, the first attempts. Where something is left to do then, `further` may go on from
+/// there: it gets the body and what was reached. The body only gives way before that where at most so many pairs (`most`) are
+/// left.
+pub(super) fn resolved_further<E: From<ResolveError>>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    budget: &Budget,
-    further: impl FnOnce(&Body<'_>, Resolved) -> Result<Resolved, E>,
+    most: usize,
+    further: impl FnOnce(&Body<'_>, Resolved, &Budget) -> Result<Resolved, E>,
 ) -> Result<Resolved, E> {
+    let budget = &Budget::new(settings, layers.len());
+    settings.check()?;
+    check(body, layers)?;
     let preparing = Instant::now();
     with_drawn(body, layers, |drawn| {
-        let body_time = preparing.elapsed();
-        let most = if settings.steps > 0 { MOST_TO_YIELD } else { usize::MAX };
-        resolved_near(drawn, layers, settings, (budget, body_time), most, further)
-    })
-}
-
-/// [`resolved_further`] with a body that is prepared near `layers`, which took `body_time`; it gives way where at most so many pairs
-/// (`most`) are left.
-pub(super) fn resolved_near<E>(
-    drawn: BodyObstacle<'_>,
-    layers: &[Layer<'_>],
-    settings: &ResolveSettings,
-    (budget, body_time): (&Budget, Duration),
-    most: usize,
-    further: impl FnOnce(&Body<'_>, Resolved) -> Result<Resolved, E>,
-) -> Result<Resolved, E> {
-    let body = drawn.surface;
-    let mut simple = simply_resolved(&drawn, layers, settings, (budget, body_time));
-    if simple.certificate.is_clear() {
-        simple.go_on(body, layers, settings, budget);
-        simple.ease(&drawn, layers, settings, budget, ease::TIMES);
-        simple.compare_since(layers, budget);
-        return Ok(simple);
-    }
-    let relieving = Instant::now();
-    with_body(drawn, layers.len(), |room| {
-        let mut found = match simple.certificate.between() <= most {
-            true => resolved(room, layers, settings, simple, (budget, relieving)),
-            false => {
-                simple.certificate.count_narrow(&room.drawn);
-                simple
-            }
-        };
-        found.go_on(body, layers, settings, budget);
-        if found.certificate.is_clear() {
-            found.ease(&room.drawn, layers, settings, budget, ease::TIMES);
+        budget.count_body(preparing);
+        if let Some(found) = passed_near(&drawn, layers, settings, budget) {
+            return Ok(found);
         }
-        found.compare_since(layers, budget);
-        let mut found = further(room, found)?;
-        found.ease(&room.drawn, layers, settings, budget, ease::TIMES);
+        budget.shorten_for(body);
+        let mut found = simply_resolved(&drawn, layers, settings, budget);
+        if found.certificate.is_clear() {
+            found.go_on(body, layers, settings, budget);
+            found.relax_strain(&drawn, layers, settings, budget, strain_relaxation::TIMES);
+        } else {
+            let yielding_since = Instant::now();
+            found = with_body(drawn, layers.len(), |yielding| {
+                budget.count_body(yielding_since);
+                found.certificate.count_narrow(&yielding.drawn);
+                if found.certificate.between() <= most {
+                    found.yield_to_cloth(yielding, layers, settings, budget);
+                }
+                found.go_on(body, layers, settings, budget);
+                let mut found = further(yielding, found, budget)?;
+                found.relax_strain(&yielding.drawn, layers, settings, budget, strain_relaxation::TIMES);
+                Ok::<_, E>(found)
+            })?;
+        }
         found.compare_since(layers, budget);
         Ok(found)
     })
@@ -91,62 +73,48 @@ fn resolved_once(
 ) -> Resolved {
     let preparing = Instant::now();
     with_drawn(body, layers, |drawn| {
-        let simple = simply_resolved(&drawn, layers, settings, (budget, preparing.elapsed()));
-        if simple.certificate.is_clear() {
-            return simple;
+        budget.count_body(preparing);
+        let mut found = simply_resolved(&drawn, layers, settings, budget);
+        if !found.certificate.is_clear() {
+            let yielding_since = Instant::now();
+            with_body(drawn, layers.len(), |yielding| {
+                budget.count_body(yielding_since);
+                found.certificate.count_narrow(&yielding.drawn);
+                found.yield_to_cloth(yielding, layers, settings, budget);
+            });
         }
-        let relieving = Instant::now();
-        with_body(drawn, layers.len(), |body| resolved(body, layers, settings, simple, (budget, relieving)))
+        found
     })
 }
 
-/// [`super::resolve`] on a body that does not give way, prepared in `body_time`: enough for most garments.
+/// [`super::resolve`] on a body that does not give way: enough for most garments.
 fn simply_resolved(
     drawn: &BodyObstacle<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    (budget, body_time): (&Budget, Duration),
+    budget: &Budget,
 ) -> Resolved {
-    let now = Instant::now();
     // Wider limits are for what is left when the body has given way.
     let settings = ResolveSettings { loosened: 1.0, ..*settings };
-    let mut resolved = judged(drawn, layers, untangled(drawn, layers, &settings, budget));
-    resolved.body_time = body_time;
-    resolved.compare(layers, now.elapsed() - resolved.certificate_time);
-    resolved
-}
-
-/// [`super::resolve`] on a body that gives way, prepared since `relieving`; `simple` is what was reached before it did, and stays where
-/// it is better, or where the `budget` is spent.
-fn resolved(
-    body: &Body<'_>,
-    layers: &[Layer<'_>],
-    settings: &ResolveSettings,
-    mut simple: Resolved,
-    (budget, relieving): (&Budget, Instant),
-) -> Resolved {
-    simple.certificate.count_narrow(&body.drawn);
-    if budget.is_spent() {
-        return simple;
-    }
-    let obstacle = body.obstacle();
-    let body_time = simple.body_time + relieving.elapsed();
-    let now = Instant::now();
-    let found = untangled(obstacle, layers, settings, budget);
-    let mut found = settled(body, layers, found, settings, Room::AMPLE, budget);
-    let own: Duration = simple.garments.iter().map(|work| work.time).sum();
-    let time = own + now.elapsed() - found.certificate_time;
-    let certificate_time = simple.certificate_time + found.certificate_time;
-    let rounds = |resolved: &Resolved| resolved.garments.first().map_or(0, |work| work.rounds);
-    let all_rounds = rounds(&simple) + rounds(&found);
-    found.prefer(simple.positions, simple.certificate);
-    found.garments.iter_mut().for_each(|work| work.rounds = all_rounds);
-    (found.body_time, found.certificate_time) = (body_time, certificate_time);
-    found.compare(layers, time);
-    found
+    judged(drawn, layers, untangled(drawn, layers, &settings, budget), budget)
 }
 
 impl Resolved {
+    /// [`super::resolve`] on a `body` that gives way, which is taken where it is better. Nothing where the `budget` is spent.
+    fn yield_to_cloth(
+        &mut self,
+        body: &Body<'_>,
+        layers: &[Layer<'_>],
+        settings: &ResolveSettings,
+        budget: &Budget,
+    ) {
+        if !budget.is_spent() {
+            let found = untangled(body.obstacle(), layers, settings, budget);
+            let found = settled(body, layers, found, settings, Clearance::AMPLE, budget);
+            self.prefer(layers, found.positions, found.certificate);
+        }
+    }
+
     /// Where few crossings are left on `body`, or none but those of garments with themselves, attempts that begin where
     /// the one before ended: cloth that is nearly sorted out is the better shape to return to and to measure lengths
     /// from than the drape it came from. None where limits are strict (`settings.loosened`).
@@ -157,74 +125,25 @@ impl Resolved {
         settings: &ResolveSettings,
         budget: &Budget,
     ) {
+        let attempts = if settings.loosened > 1.0 { &AGAIN[..] } else { &[] };
         let mut now = self.positions.clone();
-        let attempts = if settings.loosened > 1.0 { FURTHER_ATTEMPTS } else { 0 };
-        for _ in 0..attempts {
+        for again in attempts {
             let left = self.certificate.between();
             let is_smooth = !settings.self_contact || self.certificate.self_triangle_pairs <= FEW_OF_ITSELF;
             if left == 0 && is_smooth || left > FEW || budget.is_spent() {
                 break;
             }
-            let found = resolved_once(body, &at(layers, &now), settings, budget);
-            self.add_work(&found);
-            let is_stuck = found.positions == now;
-            now.clone_from(&found.positions);
-            self.prefer(found.positions, found.certificate);
-            if is_stuck {
-                break;
-            }
-        }
-    }
-
-    /// Where few crossings are left in the end, tries to mend them with other gaps. None where limits are strict.
-    /// Returns whether that was better.
-    pub(super) fn mend_last(
-        &mut self,
-        body: &Surface<f64>,
-        layers: &[Layer<'_>],
-        settings: &ResolveSettings,
-        budget: &Budget,
-    ) -> bool {
-        let mut is_better = false;
-        let attempts = if settings.loosened > 1.0 { &LAST[..] } else { &[] };
-        for (gap, rings) in attempts {
-            let left = self.certificate.between();
-            if left == 0 || left > FEW || budget.is_spent() {
-                break;
-            }
+            // Self-intersections become fewer from attempt to attempt as they are.
+            let (gap, rings) = if left > 0 { *again } else { (1.0, 1) };
             let settings =
                 ResolveSettings { gap: gap * settings.gap, rings: rings * settings.rings, ..*settings };
-            let found = resolved_once(body, &at(layers, &self.positions), &settings, budget);
-            self.add_work(&found);
-            is_better |= self.prefer(found.positions, found.certificate);
+            let found = resolved_once(body, &at(layers, &now), &settings, budget);
+            now.clone_from(&found.positions);
+            self.prefer(layers, found.positions, found.certificate);
+            if left > 0 {
+                now.clone_from(&self.positions);
+            }
         }
-        is_better
-    }
-
-    /// Where nothing crosses but garments themselves, lays out what of them is folded, beside where they are `skinned`,
-    /// and begins once more from there. Returns whether that was better.
-    pub(super) fn lay_out(
-        &mut self,
-        body: &Surface<f64>,
-        layers: &[Layer<'_>],
-        skinned: &[Vec<[f64; 3]>],
-        settings: &ResolveSettings,
-        budget: &Budget,
-    ) -> bool {
-        let is_smooth = self.certificate.self_triangle_pairs <= FEW_OF_ITSELF;
-        if is_smooth || !self.certificate.is_clear() || budget.is_spent() {
-            return false;
-        }
-        let now = at(layers, &self.positions);
-        let folds = Folds::of(body, &now, skinned);
-        if folds.is_empty() {
-            return false;
-        }
-        let laid_out = folds.laid_out(&now, skinned);
-        let mut found = resolved_once(body, &at(layers, &laid_out), settings, budget);
-        found.go_on(body, layers, settings, budget);
-        self.add_work(&found);
-        self.prefer(found.positions, found.certificate)
     }
 }
 
@@ -234,24 +153,23 @@ pub(super) fn settled(
     layers: &[Layer<'_>],
     found: Untangled,
     settings: &ResolveSettings,
-    room: Room,
+    clearance: Clearance,
     budget: &Budget,
 ) -> Resolved {
-    let mut resolved = judged(&body.drawn, layers, found);
-    ClosingIn { body, layers, room, budget }.improve(&mut resolved, settings);
+    let mut resolved = judged(&body.drawn, layers, found, budget);
+    ClearanceWithdrawal { body, layers, clearance, budget }.improve(&mut resolved, settings);
     resolved
 }
 
 /// What untangling left, with its certificate.
-pub(super) fn judged(drawn: &BodyObstacle<'_>, layers: &[Layer<'_>], found: Untangled) -> Resolved {
+pub(super) fn judged(
+    drawn: &BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    found: Untangled,
+    budget: &Budget,
+) -> Resolved {
     let start = Instant::now();
     let certificate = certified(drawn, layers, &found.positions);
-    let work = GarmentWork { rounds: found.rounds, ..GarmentWork::default() };
-    Resolved {
-        positions: found.positions,
-        certificate,
-        garments: vec![work; layers.len()],
-        certificate_time: start.elapsed(),
-        ..Resolved::default()
-    }
+    budget.count_certificate(start);
+    Resolved { positions: found.positions, certificate, ..Resolved::default() }
 }

@@ -3,10 +3,10 @@
 use std::cell::OnceCell;
 
 use super::Layer;
+use super::clearance::{Before, Clearance, YieldedBody};
 use super::garment::triangles;
 use super::near::near_cloth;
 use super::obstacle::BodyObstacle;
-use super::relief::{Before, Relief, Room};
 use crate::query::Surface;
 
 /// Calls `with` the body of `surface` as it is drawn, near `layers`: the same garments once or, in several places, more often.
@@ -21,22 +21,22 @@ pub(super) fn with_drawn<R>(
 
 /// Calls `with` a `drawn` body that can give way to `garments` garments.
 pub(super) fn with_body<R>(drawn: BodyObstacle<'_>, garments: usize, with: impl FnOnce(&Body<'_>) -> R) -> R {
-    with_body_after(Room::AMPLE, None, drawn, garments, with)
+    with_body_after(Clearance::AMPLE, None, drawn, garments, with)
 }
 
-/// [`with_body`] that gives way as `room` says, a step after it did `before`.
+/// [`with_body`] that gives way as `clearance` says, a step after it did `before`.
 pub(super) fn with_body_after<R>(
-    room: Room,
+    clearance: Clearance,
     before: Option<Before<'_>>,
     mut drawn: BodyObstacle<'_>,
     garments: usize,
     with: impl FnOnce(&Body<'_>) -> R,
 ) -> R {
-    let relief = Relief::of(&drawn, garments, room, before);
-    if let Some(relief) = &relief {
-        drawn.gives_way(relief);
+    let yielded = YieldedBody::of(&drawn, garments, clearance, before);
+    if let Some(yielded) = &yielded {
+        drawn.gives_way(yielded);
     }
-    with(&Body { drawn, garments, relief: relief.as_ref(), relieved: OnceCell::new() })
+    with(&Body { drawn, garments, yielded: yielded.as_ref(), yielded_obstacle: OnceCell::new() })
 }
 
 /// A posed body near some garments.
@@ -44,15 +44,17 @@ pub(super) struct Body<'a> {
     /// As it is drawn: what a certificate counts against. Faces that give way are noted.
     pub drawn: BodyObstacle<'a>,
     garments: usize,
-    relief: Option<&'a Relief>,
-    relieved: OnceCell<BodyObstacle<'a>>,
+    yielded: Option<&'a YieldedBody>,
+    yielded_obstacle: OnceCell<BodyObstacle<'a>>,
 }
 
 impl<'a> Body<'a> {
     /// What the garments have to stay out of while they are sorted out.
     pub fn obstacle(&self) -> &BodyObstacle<'a> {
-        match self.relief {
-            Some(relief) => self.relieved.get_or_init(|| BodyObstacle::relieved(relief, self.drawn.near)),
+        match self.yielded {
+            Some(yielded) => {
+                self.yielded_obstacle.get_or_init(|| BodyObstacle::yielded_obstacle(yielded, self.drawn.near))
+            }
             None => &self.drawn,
         }
     }
@@ -60,13 +62,13 @@ impl<'a> Body<'a> {
     /// How far every vertex gives way (m).
     pub fn steps(&self) -> Vec<f64> {
         let none = || vec![0.0; self.drawn.surface.positions.len()];
-        self.relief.map_or_else(none, |relief| relief.steps.clone())
+        self.yielded.map_or_else(none, |yielded| yielded.steps.clone())
     }
 
-    /// Calls `with` what the garments have to stay out of where the body gives way as far as `room` says.
-    pub fn with_room<R>(&self, room: Room, with: impl FnOnce(&BodyObstacle<'_>) -> R) -> R {
-        match Relief::of(&self.drawn, self.garments, room, None) {
-            Some(relief) => with(&BodyObstacle::relieved(&relief, self.drawn.near)),
+    /// Calls `with` what the garments have to stay out of where the body gives way as far as `clearance` says.
+    pub fn with_clearance<R>(&self, clearance: Clearance, with: impl FnOnce(&BodyObstacle<'_>) -> R) -> R {
+        match YieldedBody::of(&self.drawn, self.garments, clearance, None) {
+            Some(yielded) => with(&BodyObstacle::yielded_obstacle(&yielded, self.drawn.near)),
             None => with(&self.drawn),
         }
     }

@@ -20,6 +20,8 @@ pub(super) struct Budget {
     time: Option<Duration>,
     rounds: Cell<usize>,
     spent: Cell<usize>,
+    body_time: Cell<Duration>,
+    certificate_time: Cell<Duration>,
 }
 
 impl Budget {
@@ -31,6 +33,8 @@ impl Budget {
             time: settings.time.map(all),
             rounds: settings.total_rounds.into(),
             spent: Cell::default(),
+            body_time: Cell::default(),
+            certificate_time: Cell::default(),
         }
     }
 
@@ -64,6 +68,26 @@ impl Budget {
     /// Whether only the last rounds are left: what is under way had better come to its end.
     pub fn is_nearly_spent(&self) -> bool {
         self.spent() >= self.rounds.get() - self.rounds.get() / LAST || self.is_late()
+    }
+
+    /// Counts the time since `start` as that to prepare a body.
+    pub fn count_body(&self, start: Instant) {
+        self.body_time.set(self.body_time() + start.elapsed());
+    }
+
+    /// Counts the time since `start` as that for a certificate.
+    pub fn count_certificate(&self, start: Instant) {
+        self.certificate_time.set(self.certificate_time() + start.elapsed());
+    }
+
+    /// Time to prepare bodies.
+    pub fn body_time(&self) -> Duration {
+        self.body_time.get()
+    }
+
+    /// Time for certificates.
+    pub fn certificate_time(&self) -> Duration {
+        self.certificate_time.get()
     }
 
     /// Wall time since it began.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Layer;
 use super::obstacle::BodyObstacle;
+use super::{Defects, Layer};
 use crate::contact::{Report, TrianglePairs};
 
 /// Proof of the state of dressed garments: every number comes from exact predicates over all pairs of triangles, or (depths)
@@ -236,18 +236,18 @@ impl Certificate {
 
     /// How many times over the strain energy has risen by half of what it was: 0 where cloth is merely pulled straight,
     /// more where it is torn out of shape, which shows.
-    pub fn tears(&self) -> usize {
-        self.strain_added.map_or(0, |added| (added / TEAR) as usize)
+    pub fn excess_strain(&self) -> usize {
+        self.strain_added.map_or(0, |added| (added / EXCESS_STRAIN) as usize)
     }
 
-    /// What shows: cloth that crosses, and cloth that is torn out of shape.
-    pub fn flaws(&self) -> usize {
-        self.crossings().saturating_add(self.tears())
-    }
-
-    /// What is wrong: fewer is better, in this order.
-    pub(super) fn defects(&self) -> (usize, usize) {
-        (self.between(), self.self_triangle_pairs)
+    /// What is wrong.
+    pub fn defects(&self) -> Defects {
+        Defects {
+            intersections: self.crossings(),
+            narrow: self.narrow_triangle_pairs,
+            excess_strain: self.excess_strain(),
+            self_intersections: self.self_triangle_pairs,
+        }
     }
 
     /// Strain energy of all garments (J).
@@ -278,4 +278,4 @@ pub(super) fn strain_joule(layers: &[Layer<'_>]) -> f64 {
 /// Less strain energy than this (J) is rounding of a garment in its rest shape.
 const NO_STRAIN: f64 = 1e-9;
 /// A rise of the strain energy, as a share, from which cloth is torn.
-const TEAR: f64 = 0.5;
+const EXCESS_STRAIN: f64 = 0.5;

@@ -5,13 +5,13 @@
 //!
 //! 1. **Vertices.** The closest point of the body (of the union of its parts, [`crate::query::UnionDistance`]) leaves a vertex a
 //!    half-space. Along its own direction away from the body it sees the sheets of inner garments, and has to stay over the
-//!    outermost ([`over`]); past a hem there is none.
+//!    outermost ([`layer_constraint`]); past a hem there is none.
 //! 2. **Triangles.** Vertices outside are not enough where cloth is coarser than the body. Every pair of triangles that crosses,
 //!    found exactly ([`detect`]), asks the part of one over the other to lie above it; linear heights make that sufficient. Which
 //!    one is above is told by the directions away from the body: the outer garment, or, where two sheets look at each other
 //!    (a sleeve and the side of the chest), each on its own part's side, whichever garments they belong to.
-//! 3. **Folds.** Sheets of one garment that cross and have no such order are parted by what most of their vertices say
-//!    ([`folds`]), crumples are smoothed.
+//! 3. **Self-intersections.** Sheets of one garment that cross and have no such order are parted by what most of their vertices say
+//!    ([`self_intersections`]), crumples are smoothed.
 //! 4. **Relaxation.** Vertices on the wrong side and their neighbourhood move by a displacement from the input that is smooth,
 //!    aims at the edge lengths there were, and meets all conditions as far as vertices may move ([`relax`]); everything
 //!    else keeps its position to the bit. Conditions of a crossing are kept for good. Repeated until no pair is left or
@@ -19,71 +19,64 @@
 //! 5. **Certificate.** All pairs are counted again, from nothing, by the exact predicates.
 //!
 //! **Pinched regions**, where the body lies inside itself, are told apart by a stated rule: `BodyObstacle`. There, and where
-//! hardly any cloth fits between two parts, the body gives way ([`relief`]) where crossings are left otherwise; in the
+//! hardly any cloth fits between two parts, the body gives way ([`clearance`]) where crossings are left otherwise; in the
 //! end garments are brought out of it again where they can.
 //!
-//! **Once more.** Where few crossings are left, what was reached is resolved like a new drape, in the end with other gaps.
+//! **Once more.** Where few crossings are left, what was reached is resolved like a new drape.
 //!
-//! **Easing.** Where the strain energy has risen, cloth gives back what it can without crossing anything ([`ease`]).
-//!
-//! **Folds of the drape.** What only a network folds into itself is laid out by [`resolve_along`] before all this
-//! ([`unfold`]), and what of it is left in the end once more.
+//! **Strain.** Where the strain energy has risen, cloth gives back what it can without crossing anything ([`strain_relaxation`]).
 //!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
-//! step by step to the pose ([`follow`], [`way`]); in short steps cloth keeps the sides it was on before ([`sides`]). Where that
-//! leaves some, it does so again with drapes that lie nearer to where they began ([`taken_back`]).
+//! step by step to the pose ([`continuation`], [`path`]); in short steps cloth keeps the sides it was on before ([`sides`]).
 
 mod attempt;
 mod body;
 mod budget;
 mod certificate;
-mod close_in;
+mod clearance;
 mod contact;
+mod continuation;
 mod count;
+mod defects;
 mod detect;
-mod ease;
 mod error;
 mod fast_pass;
-mod folds;
-mod follow;
 mod garment;
+mod layer_constraint;
 mod near;
 mod obstacle;
 mod outfit;
-mod over;
+mod path;
+mod path_sample;
 mod relax;
-mod relief;
 mod resolved;
+mod self_intersections;
 mod settings;
 mod sides;
 mod stages;
-mod strides;
-mod taken_back;
+mod step_lengths;
+mod strain_relaxation;
 #[cfg(test)]
 mod tests;
-mod unfold;
 mod untangle;
-mod way;
-mod waypoint;
+mod withdrawal;
 
 pub use certificate::{
     Certificate, Crossed, GarmentCertificate, LayerCertificate, PinchedPairs, RemainingPair,
 };
+pub use continuation::{resolve_after, resolve_along};
 pub use count::certify;
+pub use defects::Defects;
 pub use error::ResolveError;
 pub use fast_pass::fast_pass;
 use fast_pass::passed_near;
-pub use follow::{resolve_after, resolve_along};
 pub use garment::{FARTHEST, Layer, RestGarment};
+pub use path_sample::{PathSample, Reached};
 pub use resolved::{GarmentWork, Resolved};
 pub use settings::ResolveSettings;
-pub use waypoint::{PathSample, Reached};
 
 use crate::query::Surface;
-use attempt::resolved_near;
-use body::with_drawn;
-use budget::Budget;
-use garment::check;
+use attempt::resolved_further;
 
 /// Takes `layers`, innermost first, out of `body` and out of each other. Deterministic for any number of threads (without a
 /// time limit in the settings); a clean input comes back to the bit.
@@ -96,15 +89,5 @@ pub fn resolve(
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
 ) -> Result<Resolved, ResolveError> {
-    let budget = &Budget::new(settings, layers.len());
-    settings.check()?;
-    check(body, layers)?;
-    with_drawn(body, layers, |drawn| {
-        let body_time = budget.elapsed();
-        if let Some(found) = passed_near(&drawn, layers, settings, (budget, body_time)) {
-            return Ok(found);
-        }
-        budget.shorten_for(body);
-        resolved_near(drawn, layers, settings, (budget, body_time), usize::MAX, |_, found| Ok(found))
-    })
+    resolved_further(body, layers, settings, usize::MAX, |_, found, _| Ok(found))
 }

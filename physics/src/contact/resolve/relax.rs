@@ -107,7 +107,12 @@ fn limit_length(
     if now == allowed || now < 1e-12 {
         return;
     }
-    let step = scale(along, (now - allowed) / now);
+    move_ends(positions, (a, b), b_may_move, scale(along, (now - allowed) / now));
+}
+
+/// Moves the ends of an edge towards each other by `step`; `b` may be fixed.
+#[inline]
+fn move_ends(positions: &mut [[f64; 3]], (a, b): (usize, usize), b_may_move: bool, step: [f64; 3]) {
     if b_may_move {
         positions[a] = add_scaled(positions[a], 0.5, step);
         positions[b] = add_scaled(positions[b], -0.5, step);
@@ -131,11 +136,5 @@ pub(super) fn keep_length(positions: &mut [[f64; 3]], a: usize, b: usize, b_may_
     if now < 1e-12 {
         return;
     }
-    let step = scale(along, LENGTH_STIFFNESS * (now - length) / now);
-    if b_may_move {
-        positions[a] = add_scaled(positions[a], 0.5, step);
-        positions[b] = add_scaled(positions[b], -0.5, step);
-    } else {
-        positions[a] = add(positions[a], step);
-    }
+    move_ends(positions, (a, b), b_may_move, scale(along, LENGTH_STIFFNESS * (now - length) / now));
 }

@@ -42,61 +42,54 @@ pub struct GarmentWork {
 }
 
 impl Resolved {
-    /// The better of two results for the same drape: the one with fewer [`Certificate::flaws`], of equal ones the one with fewer
-    /// pairs that are narrow, then `self`. It counts the work of both.
+    /// The better of two results for the same drape, `self` if they are equally good. It counts the work of both.
     #[must_use]
-    pub fn or(self, other: Self) -> Self {
-        self.or_by(other, |c| (c.flaws(), c.between()))
-    }
-
-    /// [`or`](Self::or) where the one of lower `rank` is the better one.
-    pub(super) fn or_by<K: Ord>(mut self, mut other: Self, rank: impl Fn(&Certificate) -> K) -> Self {
-        if rank(&other.certificate) < rank(&self.certificate) {
+    pub fn or(mut self, mut other: Self) -> Self {
+        if other.certificate.defects() < self.certificate.defects() {
             std::mem::swap(&mut self, &mut other);
         }
-        self.add_work(&other);
+        self.body_time += other.body_time;
+        self.certificate_time += other.certificate_time;
         self.steps += other.steps;
         self.rounds += other.rounds;
         for (work, further) in self.garments.iter_mut().zip(&other.garments) {
+            work.rounds += further.rounds;
             work.time += further.time;
         }
         self
     }
 
-    /// Counts the rounds of another attempt, and its time for the body and for certificates.
-    pub(super) fn add_work(&mut self, attempt: &Self) {
-        for (work, further) in self.garments.iter_mut().zip(&attempt.garments) {
-            work.rounds += further.rounds;
-        }
-        self.body_time += attempt.body_time;
-        self.certificate_time += attempt.certificate_time;
-    }
-
-    /// Takes another state of the garments if it is better; whether it is.
-    pub(super) fn prefer(&mut self, positions: Vec<Vec<[f64; 3]>>, certificate: Certificate) -> bool {
-        let is_better = certificate.defects() < self.certificate.defects();
-        if is_better {
+    /// Takes another state of the garments, which were `layers` before the post-process, if it is better.
+    pub(super) fn prefer(
+        &mut self,
+        layers: &[Layer<'_>],
+        positions: Vec<Vec<[f64; 3]>>,
+        mut certificate: Certificate,
+    ) {
+        self.certificate.compare_strain(layers);
+        certificate.compare_strain(layers);
+        if certificate.defects() < self.certificate.defects() {
             (self.positions, self.certificate) = (positions, certificate);
         }
-        is_better
     }
 
-    /// [`compare`](Self::compare) for all work of `budget`, without the time for the body and for certificates.
+    /// Tells moves and strain from `layers`, and what all the work of `budget` took.
     pub(super) fn compare_since(&mut self, layers: &[Layer<'_>], budget: &Budget) {
-        self.compare(layers, budget.elapsed().saturating_sub(self.body_time + self.certificate_time));
+        (self.body_time, self.certificate_time) = (budget.body_time(), budget.certificate_time());
+        let time = budget.elapsed().saturating_sub(self.body_time + self.certificate_time);
         self.rounds = budget.spent();
-        self.certificate.is_stopped = budget.is_nearly_spent() && !self.certificate.is_clear();
-    }
-
-    /// Tells moves and strain from `layers`, and that all of it took `time`.
-    pub(super) fn compare(&mut self, layers: &[Layer<'_>], time: Duration) {
         let count: usize = self.positions.iter().map(Vec::len).sum();
-        for ((work, layer), positions) in self.garments.iter_mut().zip(layers).zip(&self.positions) {
+        let work = |(layer, positions): (&Layer<'_>, &Vec<[f64; 3]>)| {
             let moves = layer.positions.iter().zip(positions).map(|(p, q)| vec3::norm(vec3::sub(*q, *p)));
-            work.moved = moves.clone().filter(|m| *m > 0.0).count();
-            work.largest_move = moves.fold(0.0, f64::max);
-            work.time = time.mul_f64(positions.len() as f64 / count.max(1) as f64);
-        }
+            GarmentWork {
+                rounds: self.rounds,
+                moved: moves.clone().filter(|m| *m > 0.0).count(),
+                largest_move: moves.fold(0.0, f64::max),
+                time: time.mul_f64(positions.len() as f64 / count.max(1) as f64),
+            }
+        };
+        self.garments = layers.iter().zip(&self.positions).map(work).collect();
         self.certificate.compare_strain(layers);
+        self.certificate.is_stopped = budget.is_nearly_spent() && !self.certificate.is_clear();
     }
 }

@@ -31,7 +31,8 @@ pub struct ResolveSettings {
     pub stretch: f64,
     /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken if it ends
     /// with none. Where few are left in the end, all is tried again from there and both limits are measured anew. Default 6; 1
-    /// for strict limits: no attempt begins where another one ended, nothing is laid out, and cloth is not eased.
+    /// for strict limits: no attempt begins where another one ended, and added strain is not
+    /// relaxed.
     pub loosened: f64,
     /// Most steps on a way: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
     /// Default 128; 0 mends the drape as it is or not at all.
@@ -41,8 +42,7 @@ pub struct ResolveSettings {
     pub is_shallow: bool,
     /// Whether a few rounds without progress are borne with: false where a shorter step is tried next. Default yes.
     pub is_patient: bool,
-    /// Whether crossings of a garment with itself are mended where possible; otherwise nothing is laid out either. Default
-    /// yes.
+    /// Whether self-intersections are mended where possible. Default yes.
     pub self_contact: bool,
     /// Most rounds of detection and relaxation of an outfit, over all attempts and all steps of a path together; a quarter of
     /// them on a body of which more than 1,000 pairs of triangles intersect each other. Where they are used up, the best state

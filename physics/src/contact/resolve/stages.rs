@@ -1,8 +1,8 @@
-//! The stages of a way: none is made twice, and they end with the drape that is to be resolved.
+//! The stages of a path: none is made twice, and they end with the drape that is to be resolved.
 //!
-//! A step that is halved comes by the same places again, and so does a second way.
+//! A step that is halved comes by the same places again.
 //!
-//! The drape at the end may be more than what is known of the stages: a solver may have refined it. What it differs by from the stage at 1 is faded in along the way, in the frames of the skinning transforms.
+//! The drape at the end may be more than what is known of the stages: a solver may have refined it. What it differs by from the stage at 1 is faded in along the path, in the frames of the skinning transforms.
 
 use super::{Layer, PathSample};
 use crate::transform::{into_frame, out_of_frame};
@@ -11,7 +11,7 @@ use crate::vec3::{add_scaled, sub};
 /// Stages kept: some megabytes each.
 const MOST: usize = 64;
 
-/// Stages by their share of the way; the last one, and the others that were used last, are kept.
+/// Stages by their share of the path; the last one, and the others that were used last, are kept.
 pub(super) struct Stages<'a> {
     end: &'a [Layer<'a>],
     /// None before a stage was asked for.
@@ -19,7 +19,7 @@ pub(super) struct Stages<'a> {
     kept: Vec<(f64, PathSample)>,
 }
 
-/// The end of the way.
+/// The end of the path.
 struct Last {
     stage: PathSample,
     /// What the drape there differs by from what is known of the stages, in the frames of all vertices.
@@ -27,7 +27,7 @@ struct Last {
 }
 
 impl<'a> Stages<'a> {
-    /// Those of a way to the drape `end`.
+    /// Those of a path to the drape `end`.
     pub fn to(end: &'a [Layer<'a>]) -> Self {
         Self { end, last: None, kept: Vec::new() }
     }
@@ -96,7 +96,6 @@ mod tests {
         PathSample {
             body: Arc::new(Surface::from_mesh(&shapes::tetrahedron())),
             draped: vec![rest.iter().map(|p| turn(*p)).collect()],
-            skinned: Vec::new(),
             transforms: vec![[[c, 0.0, s, 0.0], [0.0, 1.0, 0.0, 0.0], [-s, 0.0, c, 0.0]]; rest.len()],
         }
     }

@@ -376,7 +376,7 @@ fn of_two_results_the_one_with_fewer_crossings_counts_and_the_work_of_both() {
         torn.certificate.strain_added = Some(strain);
         torn
     };
-    // Narrow pairs are no crossings, but of two results without any the one with fewer pairs is better.
+    // Intersections come first, then narrow pairs, then torn cloth.
     let (crossed, narrow, clear) = (result(8, 0, 0, 1), result(10, 10, 0, 2), result(0, 0, 0, 4));
     for (first, second, best) in [
         (&crossed, &narrow, &narrow),
@@ -384,13 +384,11 @@ fn of_two_results_the_one_with_fewer_crossings_counts_and_the_work_of_both() {
         (&narrow, &clear, &clear),
         (&clear, &narrow, &clear),
         (&result(2, 2, 1, 0), &result(1, 0, 0, 0), &result(1, 0, 0, 0)),
-        (&torn(0.9), &narrow, &narrow),
+        (&torn(0.9), &narrow, &torn(0.9)),
         (&torn(1.1), &torn(0.4), &torn(0.4)),
         // A little more strain is no reason to take another result.
         (&torn(0.4), &torn(0.1), &torn(0.4)),
-        // Torn cloth shows as well as cloth that crosses.
-        (&crossed, &torn(3.9), &torn(3.9)),
-        (&crossed, &torn(30.0), &crossed),
+        (&crossed, &torn(30.0), &torn(30.0)),
     ] {
         let found = first.clone().or(second.clone());
         assert_eq!(found.certificate, best.certificate);

@@ -2,7 +2,9 @@
 
 use super::FastPass;
 use crate::contact::resolve::contact::{Contact, Plane, along_line, is_tiny, normal_of};
-use crate::contact::resolve::over::{Order, OutermostSheet, Over, STEEP, order, part_along, part_from_body};
+use crate::contact::resolve::layer_constraint::{
+    LayerConstraint, Order, OutermostSheet, STEEP, order, part_along, part_from_body,
+};
 use crate::contact::step_filter::{Bounds, ElementPair, closest_on_edges};
 use crate::vec3::{add, add_scaled, cross, dot, normalized, scale, sub};
 use rayon::prelude::*;
@@ -25,7 +27,7 @@ pub(super) struct Defects {
     /// What the body leaves to the vertices of the region that are near it.
     planes: Vec<(u32, Plane)>,
     /// Vertices of the region that have a sheet of an inner garment near.
-    over: Vec<Over>,
+    over: Vec<LayerConstraint>,
 }
 
 impl FastPass<'_> {
@@ -37,7 +39,8 @@ impl FastPass<'_> {
             let other = if self.filter.mesh.is_body(g) { f } else { g };
             [f, other].into_iter().flat_map(|f| outfit.faces[f as usize])
         };
-        let mut seeds: Vec<u32> = self.parted().chain(self.parted_folds()).flat_map(cloth_of).collect();
+        let mut seeds: Vec<u32> =
+            self.parted().chain(self.parted_self_intersections()).flat_map(cloth_of).collect();
         loop {
             let region = outfit.neighbourhood(&seeds, super::RINGS);
             let new: Vec<u32> = region.iter().copied().filter(|&v| !found.is_in[v as usize]).collect();
@@ -66,7 +69,7 @@ impl FastPass<'_> {
     }
 
     /// What the body leaves to vertex `v`, and which sheets of inner garments it has to stay over.
-    fn look(&self, v: u32) -> (Option<Plane>, Vec<Over>) {
+    fn look(&self, v: u32) -> (Option<Plane>, Vec<LayerConstraint>) {
         let (p, away) = (self.positions[v as usize], self.outward[v as usize]);
         let plane = self.planes[v as usize].filter(|plane| plane.distance < NEAR);
         // More than half way through a limb the nearest way out is its other side: cloth goes back to its own.
@@ -76,7 +79,7 @@ impl FastPass<'_> {
     }
 
     /// Of every inner garment the outermost sheet that lies less than [`REACH`] over vertex `v`.
-    fn sheets_over(&self, v: u32) -> Vec<Over> {
+    fn sheets_over(&self, v: u32) -> Vec<LayerConstraint> {
         let (p, away, garment) =
             (self.positions[v as usize], self.outward[v as usize], self.outfit.garment_of(v));
         if away == [0.0; 3] || garment == 0 {

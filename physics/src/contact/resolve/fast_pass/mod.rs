@@ -11,24 +11,23 @@ mod conditions;
 #[cfg(test)]
 mod tests;
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::attempt::FEW_OF_ITSELF;
 use super::body::with_drawn;
 use super::budget::Budget;
 use super::certificate::Certificate;
 use super::contact::{Contact, Plane};
-use super::ease::{Easing, contact_mesh};
-use super::folds::folds;
 use super::garment::check;
+use super::layer_constraint::outward;
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
-use super::over::outward;
 use super::relax::{LastPasses, no_farther, relax};
-use super::{GarmentWork, Layer, ResolveError, ResolveSettings, Resolved, ease};
+use super::self_intersections::part_self_intersections;
+use super::strain_relaxation::{StrainRelaxation, contact_mesh};
+use super::{Layer, ResolveError, ResolveSettings, Resolved, strain_relaxation};
 use crate::contact::step_filter::{ContactMesh, FacePairs, StepFilter};
 use crate::query::Surface;
-use crate::vec3::{add, add_scaled, scale, sub};
 use rayon::prelude::*;
 
 /// Rings of neighbours around a defect that move along.
@@ -46,7 +45,7 @@ const STALLS: usize = 5;
 /// More intersections than this after a round that hardly helped are not for the fast pass.
 const MANY: usize = 200;
 /// How far sheets of one garment are parted, as a share of the gap.
-const FOLD_GAP: f64 = 0.25;
+const SELF_GAP: f64 = 0.25;
 /// A share of vertices under an inner garment from which whole parts lie on the wrong side without intersecting anything.
 const ORDER_VIOLATIONS: f64 = 1e-2;
 /// What elements stay apart in a filtered step, as a share of the gap.
@@ -66,18 +65,19 @@ pub fn fast_pass(
     settings.check()?;
     check(body, layers)?;
     let budget = &Budget::new(settings, layers.len());
+    let preparing = Instant::now();
     Ok(with_drawn(body, layers, |drawn| {
-        let body_time = budget.elapsed();
-        passed_near(&drawn, layers, settings, (budget, body_time))
+        budget.count_body(preparing);
+        passed_near(&drawn, layers, settings, budget)
     }))
 }
 
-/// [`fast_pass`] on a body that is prepared near `layers`, which took `body_time`.
+/// [`fast_pass`] on a body that is prepared near `layers`.
 pub(super) fn passed_near(
     drawn: &BodyObstacle<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    (budget, body_time): (&Budget, Duration),
+    budget: &Budget,
 ) -> Option<Resolved> {
     let outfit = Outfit::new(layers);
     let surface = drawn.surface;
@@ -85,45 +85,40 @@ pub(super) fn passed_near(
     let mesh = contact_mesh(&outfit, surface.positions.len(), near);
     let mut pass = FastPass::new(&outfit, drawn, &mesh, settings);
     let rounds = pass.run(budget);
-    let most_folds = match mends_folds(settings) {
+    let most_self_intersections = match mends_self_intersections(settings) {
         true => FEW_OF_ITSELF,
         false => pass.folds.len(),
     };
-    if pass.between() > 0 || pass.parted_folds().count() > most_folds || pass.own().count() > pass.folds.len()
+    if pass.between() > 0
+        || pass.parted_self_intersections().count() > most_self_intersections
+        || pass.own().count() > pass.folds.len()
     {
         return None;
     }
-    pass.ease(budget);
+    pass.relax_strain(budget);
     let positions = pass.garments();
     let certifying = Instant::now();
     let certificate = pass.certificate(&positions);
-    let certificate_time = certifying.elapsed();
-    let work = GarmentWork { rounds, ..GarmentWork::default() };
-    let mut resolved = Resolved {
-        positions,
-        certificate,
-        garments: vec![work; layers.len()],
-        body_time,
-        certificate_time,
-        ..Resolved::default()
-    };
+    budget.count_certificate(certifying);
+    let mut resolved = Resolved { positions, certificate, ..Resolved::default() };
     resolved.compare_since(layers, budget);
-    is_good(&resolved.certificate, most_folds).then_some(resolved)
+    resolved.garments.iter_mut().for_each(|work| work.rounds = rounds);
+    is_good(&resolved.certificate, most_self_intersections).then_some(resolved)
 }
 
 /// Whether folds of the input are mended, not only those that were made: strict limits leave them.
-fn mends_folds(settings: &ResolveSettings) -> bool {
+fn mends_self_intersections(settings: &ResolveSettings) -> bool {
     settings.self_contact && settings.loosened > 1.0
 }
 
-/// Whether nothing is left for another stage: neither what intersects, nor more than `most_folds` pairs of garments
+/// Whether nothing is left for another stage: neither what intersects, nor more than `most_self_intersections` pairs of garments
 /// with themselves, nor whole parts on the wrong side, nor torn cloth.
-fn is_good(certificate: &Certificate, most_folds: usize) -> bool {
+fn is_good(certificate: &Certificate, most_self_intersections: usize) -> bool {
     certificate.is_clear()
-        && certificate.self_triangle_pairs <= most_folds
+        && certificate.self_triangle_pairs <= most_self_intersections
         && certificate.vertices_inside == 0
         && certificate.order_violations <= ORDER_VIOLATIONS
-        && certificate.tears() == 0
+        && certificate.excess_strain() == 0
 }
 
 /// An outfit on its way.
@@ -209,7 +204,10 @@ impl<'a> FastPass<'a> {
         let mut to = self.positions.clone();
         let cloth = &mut to[..self.input.len()];
         let region = &defects.region;
-        contacts.extend(self.part_folds(cloth));
+        let folds: Vec<(u32, u32)> = self.parted_self_intersections().copied().collect();
+        let (pairs, shape) = ((folds.as_slice(), self.folds.as_slice()), self.shape.as_mut_slice());
+        let gap = SELF_GAP * self.settings.gap;
+        contacts.extend(part_self_intersections(self.outfit, pairs, gap, &self.positions, (cloth, shape)).0);
         let (stretch, most) = (self.settings.stretch, self.settings.farthest);
         relax(self.outfit, cloth, &self.shape, region, &contacts, stretch, (SWEEPS, LastPasses::FEW));
         for &v in region {
@@ -224,12 +222,12 @@ impl<'a> FastPass<'a> {
     }
 
     /// Cloth gives back what it was strained by. Strict limits leave it.
-    fn ease(&mut self, budget: &Budget) {
+    fn relax_strain(&mut self, budget: &Budget) {
         if self.settings.loosened > 1.0 {
             let before = self.positions.clone();
             let is_late = || budget.is_late();
-            let easing = Easing::new(self.outfit, self.settings);
-            easing.ease(&mut self.filter, &mut self.positions, ease::TIMES, is_late);
+            let relaxing = StrainRelaxation::new(self.outfit, self.settings);
+            relaxing.relax_strain(&mut self.filter, &mut self.positions, strain_relaxation::TIMES, is_late);
             self.look_again(&before);
         }
     }
@@ -255,7 +253,7 @@ impl<'a> FastPass<'a> {
 
     /// Pairs that should go: [`between`](Self::between), and of garments with themselves.
     fn left(&self) -> [usize; 2] {
-        [self.between(), self.parted_folds().count()]
+        [self.between(), self.parted_self_intersections().count()]
     }
 
     /// Pairs that are left of garments with themselves.
@@ -264,44 +262,10 @@ impl<'a> FastPass<'a> {
     }
 
     /// Pairs of garments with themselves that are to be parted.
-    fn parted_folds(&self) -> impl Iterator<Item = &(u32, u32)> {
+    fn parted_self_intersections(&self) -> impl Iterator<Item = &(u32, u32)> {
         let is_known = |pair| self.folds.binary_search(pair).is_ok();
-        let is_asked = move |pair| mends_folds(self.settings) || !is_known(pair);
+        let is_asked = move |pair| mends_self_intersections(self.settings) || !is_known(pair);
         self.own().filter(move |pair| is_asked(pair) && !(self.is_pinch(pair.0) && self.is_pinch(pair.1)))
-    }
-
-    /// Conditions that part folds, which are pairs of one garment after the other. Crumples are smoothed: those of the
-    /// input for good, of others what was done to them is taken back.
-    fn part_folds(&mut self, positions: &mut [[f64; 3]]) -> Vec<Contact> {
-        let all: Vec<(u32, u32)> = self.parted_folds().copied().collect();
-        let outfit = self.outfit;
-        let mut contacts = Vec::new();
-        for pairs in all.chunk_by(|a, b| outfit.garment_of_face(a.0) == outfit.garment_of_face(b.0)) {
-            let g = outfit.garment_of_face(pairs[0].0);
-            let (first, start) = (outfit.faces_of_garment(g).start, outfit.vertices(g).start);
-            let local: Vec<(u32, u32)> = pairs.iter().map(|(f, g)| (f - first, g - first)).collect();
-            let part = outfit.part(&self.positions, g);
-            let found = folds(outfit.layers[g].garment, part, &local, FOLD_GAP * self.settings.gap);
-            contacts.extend(found.contacts.into_iter().map(|contact| contact.shifted(start)));
-            let is_of_input = pairs.iter().any(|pair| self.folds.binary_search(pair).is_ok());
-            for v in found.crumpled.into_iter().map(|v| v + start) {
-                let ring = outfit.ring(v);
-                let share = 1.0 / ring.len().max(1) as f64;
-                let mean = |of: &dyn Fn(usize) -> [f64; 3]| {
-                    outfit.ring(v).fold([0.0; 3], |sum, n| add_scaled(sum, share, of(n as usize)))
-                };
-                let v = v as usize;
-                if is_of_input {
-                    let by = scale(sub(mean(&|n| self.positions[n]), self.positions[v]), 0.5);
-                    positions[v] = add(self.positions[v], by);
-                    self.shape[v] = add(self.shape[v], by);
-                } else {
-                    let by = mean(&|n| sub(self.positions[n], self.shape[n]));
-                    positions[v] = add(self.shape[v], by);
-                }
-            }
-        }
-        contacts
     }
 
     fn is_own(&self, &(f, g): &(u32, u32)) -> bool {

@@ -6,10 +6,11 @@ use rayon::prelude::*;
 
 use super::budget::Budget;
 use super::contact::{Contact, Plane};
+use super::defects::Defects;
 use super::detect::Crossings;
+use super::layer_constraint::{LayerConstraint, layer_constraints, outward};
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
-use super::over::{Over, all_over, outward};
 use super::sides::Sides;
 use super::{Layer, ResolveSettings};
 use crate::query::triangle_tree::{KeptTree, TriangleTree};
@@ -45,20 +46,17 @@ pub(super) struct Untangling<'a> {
     planes: Vec<Option<Plane>>,
     /// Directions away from the body; zero where there is none.
     outward: Vec<[f64; 3]>,
-    over: Vec<Over>,
+    over: Vec<LayerConstraint>,
     /// Trees of the garments where they were last looked at.
     trees: Vec<KeptTree>,
     crossings: Crossings,
     /// Crossings of the input's garments with themselves, ascending.
-    known_folds: Vec<(u32, u32)>,
+    known_self_intersections: Vec<(u32, u32)>,
     /// Conditions that all crossings so far asked for: a mended place would be torn again by its neighbours without them.
     remembered: Vec<Contact>,
     /// What tells the order of sheets, where it was known a step before; otherwise the directions away from the body do.
     sides: Option<&'a Sides>,
 }
-
-/// How wrong a state is: fewer is better, in this order.
-type Defects = (usize, usize);
 
 /// The best state so far.
 #[derive(Default)]
@@ -103,7 +101,7 @@ impl<'a> Untangling<'a> {
             over: Vec::new(),
             trees: (0..outfit.len()).map(|_| KeptTree::default()).collect(),
             crossings: Crossings::new(outfit.faces.len()),
-            known_folds: Vec::new(),
+            known_self_intersections: Vec::new(),
             remembered: Vec::new(),
             sides,
         };
@@ -118,29 +116,28 @@ impl<'a> Untangling<'a> {
         untangling
     }
 
-    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better; how many it took. Where crossings
-    /// are left, a second attempt with wider limits is kept if it ends with none.
-    pub fn run(&mut self) -> usize {
+    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better. Where crossings are left, a second attempt
+    /// with wider limits is kept if it ends with none.
+    pub fn run(&mut self) {
         self.detect();
-        self.known_folds.clone_from(&self.crossings.own);
-        let rounds = self.attempt();
+        self.known_self_intersections.clone_from(&self.crossings.own);
+        self.attempt();
         if self.crossings.between() == 0 || self.settings.loosened <= 1.0 || self.budget.is_spent() {
-            return rounds;
+            return;
         }
         let (positions, shape) = (self.positions.clone(), self.shape.clone());
         self.farthest *= self.settings.loosened;
         self.stretch = 1.0 + (self.stretch - 1.0) * self.settings.loosened;
-        let more = self.attempt();
-        if self.crossings.between() > 0 || self.crossings.own.len() > self.known_folds.len() {
+        self.attempt();
+        if self.crossings.between() > 0 || self.crossings.own.len() > self.known_self_intersections.len() {
             self.move_to(&positions);
             self.shape = shape;
             self.detect();
         }
-        rounds + more
     }
 
     /// Rounds within the limits as they are. The crossings are those of the positions afterwards.
-    fn attempt(&mut self) -> usize {
+    fn attempt(&mut self) {
         let mut best = Best::default();
         let patience = match (self.sides, self.settings.is_patient) {
             (Some(_), _) => PATIENCE_WITH_SIDES,
@@ -151,26 +148,29 @@ impl<'a> Untangling<'a> {
             let is_violated = self.planes.iter().flatten().any(|p| self.is_violated(p, round))
                 || self.over.iter().any(|o| o.height < self.least(round));
             if !is_violated && self.crossings.count() == 0 {
-                return round;
+                return;
             }
             best.look(self.defects(), &self.positions);
             if round == self.settings.rounds || best.stale > patience || self.budget.is_spent() {
-                self.move_to(&best.positions);
-                self.detect();
-                return round;
+                break;
             }
             self.budget.spend_round();
             self.step(round);
             self.detect();
         }
-        self.settings.rounds
+        self.move_to(&best.positions);
+        self.detect();
     }
 
-    /// Pairs that are left, and vertices on the wrong side.
+    /// Pairs that are left, self-intersections included: all are to be parted; and vertices on the wrong side.
     fn defects(&self) -> Defects {
         let wrong = self.planes.iter().flatten().filter(|p| self.is_violated(p, ROUNDS_FOR_GAPS)).count()
             + self.over.iter().filter(|o| o.height < 0.0).count();
-        (self.crossings.count() + wrong, wrong)
+        Defects {
+            intersections: self.crossings.count() + wrong,
+            self_intersections: self.crossings.own.len(),
+            ..Defects::default()
+        }
     }
 
     /// Up to which distance half-spaces and sheets are remembered (m).
@@ -199,7 +199,7 @@ impl<'a> Untangling<'a> {
             .collect();
         let reach = (self.settings.reach, self.watch());
         if self.sides.is_none() {
-            self.over = all_over(outfit, &trees, positions, &self.outward, reach);
+            self.over = layer_constraints(outfit, &trees, positions, &self.outward, reach);
         }
         // What crosses where the body is pinched has no side in the next step.
         let counted = (self.settings.self_contact, self.sides.is_some());
@@ -268,13 +268,18 @@ impl<'a> Untangling<'a> {
 #[derive(Clone, Default)]
 pub(super) struct Untangled {
     pub positions: Vec<Vec<[f64; 3]>>,
-    pub rounds: usize,
     /// Pairs with the body where it is drawn and between garments, but for pinched ones.
     pub crossings: usize,
     /// Pairs with the body, where it gives way too.
     pub with_body: usize,
-    /// Pairs of garments with themselves; on a way pinched ones too.
+    /// Pairs of garments with themselves; where contact orientation is kept pinched ones too.
     pub own: usize,
+}
+
+impl Untangled {
+    pub fn defects(&self) -> Defects {
+        Defects { intersections: self.crossings, self_intersections: self.own, ..Defects::default() }
+    }
 }
 
 pub(super) fn untangled(
@@ -296,11 +301,10 @@ pub(super) fn untangled_keeping(
 ) -> Untangled {
     let outfit = Outfit::new(layers);
     let mut untangling = Untangling::new(&outfit, body, settings, (budget, sides));
-    let rounds = untangling.run();
+    untangling.run();
     let positions = (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
     Untangled {
         positions,
-        rounds,
         crossings: untangling.crossings(),
         with_body: untangling.body_crossings(),
         own: untangling.own_crossings(),

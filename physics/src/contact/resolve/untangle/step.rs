@@ -1,11 +1,11 @@
 //! One round: what crossings and wrong sides ask for, and the relaxation that meets it.
 
 use super::super::contact::{Contact, is_tiny, normal_of};
-use super::super::folds::folds;
-use super::super::over::{Order, order, part_along, part_from_body};
+use super::super::layer_constraint::{Order, order, part_along, part_from_body};
 use super::super::relax::{LastPasses, no_farther, relax};
+use super::super::self_intersections::part_self_intersections;
 use super::Untangling;
-use crate::vec3::{add, add_scaled, dot, norm, scale, sub};
+use crate::vec3::{add, add_scaled, dot, norm, sub};
 
 /// No contact asks for a longer step than this in a round (m).
 const LONGEST_STEP: f64 = 0.02;
@@ -16,7 +16,7 @@ impl Untangling<'_> {
         let gap = self.settings.gap * (1.0 + 0.1 * round as f64).min(3.0);
         let outfit = self.outfit;
         let (mut asked, crumpled) = match self.sides {
-            None => self.part_folds(0.25 * gap),
+            None => self.part_self_intersections(0.25 * gap),
             Some(_) => (Vec::new(), self.folded()),
         };
         let mut seeds: Vec<u32> = asked.iter().flat_map(|c| c.vertices).chain(crumpled).collect();
@@ -106,11 +106,9 @@ impl Untangling<'_> {
     }
 
     /// Conditions that part crossings of garments with themselves, and crumpled vertices, which are smoothed.
-    fn part_folds(&mut self, gap: f64) -> (Vec<Contact>, Vec<u32>) {
-        let (mut contacts, mut crumpled) = (Vec::new(), Vec::new());
-        let own = std::mem::take(&mut self.crossings.own);
-        let mut folded = Vec::new();
-        for &(f, g) in &own {
+    fn part_self_intersections(&mut self, gap: f64) -> (Vec<Contact>, Vec<u32>) {
+        let (mut contacts, mut folded) = (Vec::new(), Vec::new());
+        for &(f, g) in &self.crossings.own {
             let (one, other) = (self.outfit.faces[f as usize], self.outfit.faces[g as usize]);
             match order(one, other, false, &self.outward) {
                 Order::Along(away) => {
@@ -119,60 +117,11 @@ impl Untangling<'_> {
                 Order::Unknown => folded.push((f, g)),
             }
         }
-        for of_garment in
-            folded.chunk_by(|a, b| self.outfit.garment_of_face(a.0) == self.outfit.garment_of_face(b.0))
-        {
-            let g = self.outfit.garment_of_face(of_garment[0].0);
-            let (first, start) = (self.outfit.faces_of_garment(g).start, self.outfit.vertices(g).start);
-            let had_some = of_garment.iter().any(|pair| self.known_folds.binary_search(pair).is_ok());
-            let local: Vec<(u32, u32)> = of_garment.iter().map(|(f, g)| (f - first, g - first)).collect();
-            let garment = self.outfit.layers[g].garment;
-            let found = folds(garment, self.outfit.part(&self.positions, g), &local, gap);
-            contacts.extend(found.contacts.into_iter().map(|c| c.shifted(start)));
-            let here: Vec<u32> = found.crumpled.iter().map(|v| v + start).collect();
-            // What the input already had is smoothed for good, what was done to it is taken back.
-            match had_some {
-                true => self.smooth_shape(&here),
-                false => self.smooth_moves(&here),
-            }
-            crumpled.extend(here);
-        }
-        self.crossings.own = own;
+        let before = self.positions.clone();
+        let pairs = (folded.as_slice(), self.known_self_intersections.as_slice());
+        let smoothed = (self.positions.as_mut_slice(), self.shape.as_mut_slice());
+        let (more, crumpled) = part_self_intersections(self.outfit, pairs, gap, &before, smoothed);
+        contacts.extend(more);
         (contacts, crumpled)
-    }
-
-    /// Moves vertices half way to the middle of their neighbours, and the shape they return to with them.
-    fn smooth_shape(&mut self, vertices: &[u32]) {
-        let moves: Vec<[f64; 3]> = vertices
-            .iter()
-            .map(|&v| {
-                let own = self.positions[v as usize];
-                scale(sub(self.middle(v, |n| self.positions[n as usize]), own), 0.5)
-            })
-            .collect();
-        for (&v, by) in vertices.iter().zip(moves) {
-            let v = v as usize;
-            self.positions[v] = add(self.positions[v], by);
-            self.shape[v] = add(self.shape[v], by);
-        }
-    }
-
-    /// Gives vertices the mean displacement of their neighbours.
-    fn smooth_moves(&mut self, vertices: &[u32]) {
-        let by = |n: u32| sub(self.positions[n as usize], self.shape[n as usize]);
-        let smoothed: Vec<[f64; 3]> = vertices.iter().map(|&v| self.middle(v, by)).collect();
-        for (&v, by) in vertices.iter().zip(smoothed) {
-            self.positions[v as usize] = add(self.shape[v as usize], by);
-        }
-    }
-
-    fn middle(&self, v: u32, value: impl Fn(u32) -> [f64; 3]) -> [f64; 3] {
-        let ring = self.outfit.ring(v);
-        let count = ring.len();
-        if count == 0 {
-            value(v)
-        } else {
-            scale(ring.fold([0.0; 3], |sum, n| add(sum, value(n))), 1.0 / count as f64)
-        }
     }
 }

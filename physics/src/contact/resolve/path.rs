@@ -1,53 +1,48 @@
-//! A way that garments are taken, step by step: which steps are tried, and what is done at each.
+//! A path that garments are taken, step by step: which steps are tried, and what is done at each.
 
 use std::sync::OnceLock;
 
 use super::attempt::{FEW, settled};
 use super::body::{Body, with_body_after, with_drawn};
 use super::budget::Budget;
+use super::clearance::{Before, Clearance};
 use super::garment::{at, check};
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
-use super::relief::{Before, Room};
 use super::sides::Sides;
-use super::strides::Strides;
+use super::step_lengths::StepLengths;
 use super::untangle::{Untangled, untangled, untangled_keeping};
 use super::{Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved};
-use crate::contact::self_triangle_pairs;
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
 
-/// The rest of the way is one step where, since nothing crossed, so many steps as short as may be left more crossings all the
-/// same: on ways that end clear it is one at most.
+/// The rest of the path is one step where, since nothing crossed, so many steps as short as may be left more crossings all the
+/// same: on paths that end clear it is one at most.
 const FAILURES: usize = 3;
 /// Steps without further crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 4;
 /// How much of what the post-process changed is kept in a long step, so that old changes fade…
 const KEPT: f64 = 0.95;
-/// …and the share of the way from which on a step is long: shorter ones keep more.
+/// …and the share of the path from which on a step is long: shorter ones keep more.
 const FADING: f64 = 1.0 / 16.0;
-/// How much more the body may give way, or less, on a whole way (m): about as fast as limbs move.
+/// How much more the body may give way, or less, on a whole path (m): about as fast as limbs move.
 const GIVING_WAY: f64 = 0.5;
-/// Crossings of garments with themselves may become more by this share, and by so many, in a short step.
-const OWN: (f64, usize) = (0.125, 4);
 
 /// Where garments are to be taken.
-pub(super) struct Way<'a, 'b> {
+pub(super) struct Path<'a, 'b> {
     pub layers: &'a [Layer<'a>],
     /// The body at 1.
     pub end: &'a Body<'b>,
     pub settings: &'a ResolveSettings,
     pub budget: &'a Budget,
-    pub strides: Strides,
+    pub step_lengths: StepLengths,
 }
 
-/// Somewhere on the way.
+/// Somewhere on the path.
 struct Place {
     reached: Reached,
     /// How far the body gave way there, per vertex (m); none where that is not known.
     gave_way: Option<Vec<f64>>,
-    /// Crossings of garments with themselves; none where they were not counted.
-    own: Option<usize>,
     /// Told when they are first asked for.
     sides: OnceLock<Sides>,
     /// Those of the place before, if they were asked for.
@@ -57,20 +52,14 @@ struct Place {
 impl Place {
     fn new(stage: PathSample, Arrived { untangled, gave_way }: Arrived, sides_before: Option<Sides>) -> Self {
         let PathSample { draped, transforms, .. } = stage;
-        let Untangled { positions, crossings, own, .. } = untangled;
+        let Untangled { positions, crossings, .. } = untangled;
         let reached = Reached { draped, positions, transforms, crossings };
-        Self { reached, gave_way: Some(gave_way), own: Some(own), sides: OnceLock::new(), sides_before }
+        Self { reached, gave_way: Some(gave_way), sides: OnceLock::new(), sides_before }
     }
 
     fn sides(&self, layers: &[Layer<'_>]) -> &Sides {
         let positions = || self.reached.positions.concat();
         self.sides.get_or_init(|| Sides::of(&Outfit::new(layers), &positions(), self.sides_before.as_ref()))
-    }
-
-    /// Whether less crosses here than `now`; garments with themselves only count in a step that `is_short`.
-    fn crosses_less_than(&self, now: &Untangled, is_short: bool) -> bool {
-        let is_crumpled = |own: usize| now.own > own + OWN.1 && now.own as f64 > (1.0 + OWN.0) * own as f64;
-        now.crossings > self.reached.crossings || is_short && self.own.is_some_and(is_crumpled)
     }
 }
 
@@ -81,9 +70,9 @@ struct Arrived {
     gave_way: Vec<f64>,
 }
 
-impl Way<'_, '_> {
+impl Path<'_, '_> {
     /// Resolves garments in the T-pose and takes them to 1; what comes of it is taken if it is better than the `best` so far.
-    /// Crossings that are there in the T-pose already are not mended on a way.
+    /// Crossings that are there in the T-pose already are not mended on a path.
     pub fn improve<E: From<ResolveError>>(
         &self,
         best: &mut Resolved,
@@ -94,16 +83,12 @@ impl Way<'_, '_> {
             return Ok(());
         }
         let (layers, settings) = (self.layers, self.settings);
-        let start = std::slice::from_ref(&t_pose.draped);
         let first = on_stage(
             layers,
             &t_pose,
-            start,
-            (self.strides.room, None),
-            |_| true,
-            |obstacle, start| {
-                with_all_own(untangled(obstacle, start, settings, self.budget), layers, settings)
-            },
+            &t_pose.draped,
+            (self.step_lengths.clearance, None),
+            |obstacle, start| untangled(obstacle, start, settings, self.budget),
         );
         let crossings = first.untangled.crossings;
         if crossings > 0 && crossings >= best.certificate.crossings() {
@@ -113,42 +98,31 @@ impl Way<'_, '_> {
         let (followed, steps) = self.go(Place::new(t_pose, first, None), most, stage_at)?;
         best.steps += steps;
         let Some(found) = followed else { return Ok(()) };
-        let mut along = settled(self.end, layers, found, settings, self.strides.room, self.budget);
+        let mut along = settled(self.end, layers, found, settings, self.step_lengths.clearance, self.budget);
         along.go_on(self.end.drawn.surface, layers, settings, self.budget);
-        best.add_work(&along);
-        let [now, then] = [&along, &*best].map(|resolved| &resolved.certificate);
-        match now.is_clear() {
-            // Cloth that was torn out of what it crossed may cross itself less, but it is torn.
-            true if !then.is_clear() || now.strain_joule() < then.strain_joule() => {
-                (best.positions, best.certificate) = (along.positions, along.certificate);
-            }
-            true => (),
-            false => {
-                best.prefer(along.positions, along.certificate);
-            }
-        }
+        best.prefer(layers, along.positions, along.certificate);
         Ok(())
     }
 
     /// Takes garments from where they are `reached`, at 0, to the stage at 1; also how many steps were tried. None where the time
     /// is used up, or no step allowed.
-    pub fn follow<E: From<ResolveError>>(
+    pub fn continue_from<E: From<ResolveError>>(
         &self,
         reached: Reached,
         stage_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
         let sides = OnceLock::new();
-        self.go(Place { reached, gave_way: None, own: None, sides, sides_before: None }, usize::MAX, stage_at)
+        self.go(Place { reached, gave_way: None, sides, sides_before: None }, usize::MAX, stage_at)
     }
 
-    /// None, too, where more than `most` pairs intersect on the way.
+    /// None, too, where more than `most` pairs intersect on the path.
     fn go<E: From<ResolveError>>(
         &self,
         mut place: Place,
         most: usize,
         mut stage_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
-        let Strides { longest, shortest, keeping, .. } = self.strides;
+        let StepLengths { longest, shortest, .. } = self.step_lengths;
         check(self.end.drawn.surface, &placed(self.layers, &place.reached.draped)?)?;
         check(self.end.drawn.surface, &placed(self.layers, &place.reached.positions)?)?;
         let (mut from, mut step, mut steps) = (0.0, longest, 0);
@@ -163,7 +137,7 @@ impl Way<'_, '_> {
             let stage = stage_at(at)?;
             steps += 1;
             let arrived = self.arrive(&place, &stage, at - from, is_shortest, is_last)?;
-            let is_worse = place.crosses_less_than(&arrived.untangled, at - from <= keeping);
+            let is_worse = arrived.untangled.crossings > place.reached.crossings;
             if is_worse && !is_shortest {
                 // Of the step that was tried: the last one may be shorter than it might have been.
                 (step, well) = (f64::max(0.5 * (at - from), shortest), 0);
@@ -189,8 +163,8 @@ impl Way<'_, '_> {
         Ok((None, steps))
     }
 
-    /// Untangles garments at `stage`, `step` of the way after `place`: as at the start of a way, and, where that leaves
-    /// crossings, with the sides that they had before, each as far as the strides allow.
+    /// Untangles garments at `stage`, `step` of the path after `place`: as at the start of a path, and, where that leaves
+    /// crossings, with the sides that they had before, each as far as the step lengths allow.
     fn arrive(
         &self,
         place: &Place,
@@ -203,76 +177,43 @@ impl Way<'_, '_> {
         let loosened = if is_shortest { self.settings.loosened } else { 1.0 };
         let settings =
             ResolveSettings { is_shallow: !is_last, is_patient: is_shortest, loosened, ..*self.settings };
-        let fading = KEPT.powf((step / FADING).min(1.0));
-        let kept: &[f64] = if is_shortest { &[fading, 1.0] } else { &[fading] };
-        let starts: Vec<_> = kept.iter().map(|kept| carried(&place.reached, stage, *kept)).collect();
-        for start in &starts {
-            check(&stage.body, &placed(self.layers, start)?)?;
-        }
-        let Strides { keeping, keeps_first, free, .. } = self.strides;
-        let is_free = step >= free || place.reached.crossings > 0;
+        let kept = KEPT.powf((step / FADING).min(1.0));
+        let start = carried(&place.reached, stage, kept);
+        check(&stage.body, &placed(self.layers, &start)?)?;
+        let StepLengths { keeping, keeps_first, clearance, .. } = self.step_lengths;
         let before = place.gave_way.as_ref().map(|steps| Before { steps, most: GIVING_WAY * step });
-        let gives_way = (self.strides.room, before);
-        let is_enough =
-            |found: &Untangled| found.crossings == 0 && !place.crosses_less_than(found, step <= keeping);
         let layers = self.layers;
-        Ok(on_stage(layers, stage, &starts, gives_way, is_enough, |obstacle, start| {
-            let at_will =
-                || with_all_own(untangled(obstacle, start, &settings, self.budget), layers, &settings);
-            let first = (step > keeping || is_free && !keeps_first).then(at_will);
+        Ok(on_stage(layers, stage, &start, (clearance, before), |obstacle, start| {
+            let first =
+                (step > keeping || !keeps_first).then(|| untangled(obstacle, start, &settings, self.budget));
             match first {
                 Some(found) if step > keeping || found.crossings == 0 => return found,
                 _ => (),
             }
             let kept = untangled_keeping(Some(place.sides(layers)), obstacle, start, &settings, self.budget);
-            let is_asked = is_free && kept.crossings > 0;
-            // Cloth that went through itself is in the way of the next steps.
-            let rank = |found: &Untangled| found.crossings + found.own;
-            match first.or_else(|| is_asked.then(at_will)) {
-                Some(found) if rank(&found) < rank(&kept) => found,
+            match first {
+                Some(found) if found.defects() < kept.defects() => found,
                 _ => kept,
             }
         }))
     }
 }
 
-/// With crossings of garments with themselves counted where the body is pinched, too, as they are where cloth keeps its sides.
-fn with_all_own(mut found: Untangled, layers: &[Layer<'_>], settings: &ResolveSettings) -> Untangled {
-    if settings.self_contact {
-        let garments = layers.iter().zip(&found.positions);
-        let own = garments.map(|(layer, now)| self_triangle_pairs(now, &layer.garment.faces).len());
-        found.own = own.sum();
-    }
-    found
-}
-
-/// Untangles the garments at `stage` by `untangle`, from each of `starts` until it `is_enough`; the best. The body
-/// gives way about as `before`.
+/// Untangles the garments at `stage` by `untangle`, from `start`. The body gives way about as `before`.
 fn on_stage(
     layers: &[Layer<'_>],
     stage: &PathSample,
-    starts: &[Vec<Vec<[f64; 3]>>],
-    (room, before): (Room, Option<Before<'_>>),
-    is_enough: impl Fn(&Untangled) -> bool,
-    mut untangle: impl FnMut(&BodyObstacle<'_>, &[Layer<'_>]) -> Untangled,
+    start: &[Vec<[f64; 3]>],
+    (clearance, before): (Clearance, Option<Before<'_>>),
+    untangle: impl FnOnce(&BodyObstacle<'_>, &[Layer<'_>]) -> Untangled,
 ) -> Arrived {
-    let mut places = at(layers, &stage.draped);
-    places.extend(starts.iter().flat_map(|start| at(layers, start)));
+    let start = at(layers, start);
+    let places = [at(layers, &stage.draped), start.clone()].concat();
     let arrive = |body: &Body<'_>| {
-        let mut best: Option<Untangled> = None;
-        for start in starts {
-            let now = untangle(body.obstacle(), &at(layers, start));
-            let rank = |found: &Untangled| (found.crossings, found.own);
-            if best.as_ref().is_none_or(|best| rank(&now) < rank(best)) {
-                best = Some(now);
-            }
-            if best.as_ref().is_some_and(&is_enough) {
-                break;
-            }
-        }
-        Arrived { untangled: best.unwrap_or_default(), gave_way: body.steps() }
+        let untangled = untangle(body.obstacle(), &start);
+        Arrived { untangled, gave_way: body.steps() }
     };
-    with_drawn(&stage.body, &places, |drawn| with_body_after(room, before, drawn, layers.len(), arrive))
+    with_drawn(&stage.body, &places, |drawn| with_body_after(clearance, before, drawn, layers.len(), arrive))
 }
 
 /// The garments elsewhere, if that is all of them.

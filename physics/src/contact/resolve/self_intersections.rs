@@ -8,14 +8,15 @@ use std::collections::HashMap;
 
 use super::RestGarment;
 use super::contact::{Contact, is_tiny, normal_of, overlap};
-use crate::vec3::{cross, dot, neg, sub};
+use super::outfit::Outfit;
+use crate::vec3::{add, cross, dot, neg, scale, sub};
 
 /// Rings around a crossing that are counted to tell the smaller side.
 const COUNTED_RINGS: usize = 10;
 
 /// What the crossings of a garment with itself ask for.
 #[derive(Debug, Default)]
-pub(super) struct Folds {
+pub(super) struct PartingConditions {
     /// Conditions that part two sheets.
     pub contacts: Vec<Contact>,
     /// Vertices of crumples, to be smoothed.
@@ -23,8 +24,13 @@ pub(super) struct Folds {
 }
 
 /// Looks at `pairs` of crossing faces (each ascending) at `positions`; sheets are parted by `gap`.
-pub(super) fn folds(garment: &RestGarment, positions: &[[f64; 3]], pairs: &[(u32, u32)], gap: f64) -> Folds {
-    let mut found = Folds::default();
+fn parting_conditions(
+    garment: &RestGarment,
+    positions: &[[f64; 3]],
+    pairs: &[(u32, u32)],
+    gap: f64,
+) -> PartingConditions {
+    let mut found = PartingConditions::default();
     let faces = &garment.faces;
     let sheets = Sheets::new(garment, pairs);
     let mut crossings: HashMap<(u32, u32), Vec<(u32, u32)>> = HashMap::new();
@@ -55,6 +61,44 @@ pub(super) fn folds(garment: &RestGarment, positions: &[[f64; 3]], pairs: &[(u32
     found.crumpled.sort_unstable();
     found.crumpled.dedup();
     found
+}
+
+/// Conditions that part `pairs` of faces at `positions`, each of one garment, one garment after the other, and the vertices of
+/// crumples. Those are smoothed (in positions and shape): for good in a garment with a pair that is `known` from the input; in
+/// others what was done to them is taken back.
+pub(super) fn part_self_intersections(
+    outfit: &Outfit<'_>,
+    (pairs, known): (&[(u32, u32)], &[(u32, u32)]),
+    gap: f64,
+    positions: &[[f64; 3]],
+    (smoothed, shape): (&mut [[f64; 3]], &mut [[f64; 3]]),
+) -> (Vec<Contact>, Vec<u32>) {
+    let (mut contacts, mut crumpled) = (Vec::new(), Vec::new());
+    for pairs in pairs.chunk_by(|a, b| outfit.garment_of_face(a.0) == outfit.garment_of_face(b.0)) {
+        let g = outfit.garment_of_face(pairs[0].0);
+        let (first, start) = (outfit.faces_of_garment(g).start, outfit.vertices(g).start);
+        let local: Vec<(u32, u32)> = pairs.iter().map(|(f, g)| (f - first, g - first)).collect();
+        let found = parting_conditions(outfit.layers[g].garment, outfit.part(positions, g), &local, gap);
+        contacts.extend(found.contacts.into_iter().map(|contact| contact.shifted(start)));
+        let is_of_input = pairs.iter().any(|pair| known.binary_search(pair).is_ok());
+        for v in found.crumpled.into_iter().map(|v| v + start) {
+            crumpled.push(v);
+            let ring = outfit.ring(v);
+            let share = 1.0 / ring.len().max(1) as f64;
+            let v = v as usize;
+            if is_of_input {
+                let mean = scale(ring.fold([0.0; 3], |sum, n| add(sum, positions[n as usize])), share);
+                let by = scale(sub(mean, positions[v]), 0.5);
+                smoothed[v] = add(positions[v], by);
+                shape[v] = add(shape[v], by);
+            } else {
+                let by = |n: u32| sub(positions[n as usize], shape[n as usize]);
+                let mean = scale(ring.fold([0.0; 3], |sum, n| add(sum, by(n))), share);
+                smoothed[v] = add(shape[v], mean);
+            }
+        }
+    }
+    (contacts, crumpled)
 }
 
 /// Faces of the crossings that hang together.
@@ -137,7 +181,7 @@ fn part(
     (f, g): (u32, u32),
     is_below: bool,
     gap: f64,
-    found: &mut Folds,
+    found: &mut PartingConditions,
 ) {
     let (face, other) = (garment.faces[f as usize], garment.faces[g as usize]);
     let (upper, lower) = (face.map(|v| positions[v as usize]), other.map(|v| positions[v as usize]));

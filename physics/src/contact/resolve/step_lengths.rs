@@ -1,10 +1,10 @@
-//! How long the steps of a way may be.
+//! How long the steps of a path may be.
 
-use super::relief::Room;
+use super::clearance::Clearance;
 
-/// How long steps are, as shares of the way.
+/// How long steps are, as shares of the path.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Strides {
+pub(super) struct StepLengths {
     /// The longest one.
     pub longest: f64,
     /// The shortest one: it is taken even where it leaves more crossings than there were.
@@ -13,32 +13,26 @@ pub(super) struct Strides {
     pub keeping: f64,
     /// Whether it does so at first, and otherwise where that leaves crossings; or the other way round.
     pub keeps_first: bool,
-    /// The shortest one in which it need not, where nothing crosses before.
-    pub free: f64,
     /// Where the body gives way, from step to step by little more or less.
-    pub room: Room,
+    pub clearance: Clearance,
 }
 
-impl Strides {
+impl StepLengths {
     /// From the T-pose to a pose.
     pub const FROM_T_POSE: Self = Self {
         longest: 1.0 / 4.0,
         shortest: 1.0 / 512.0,
         keeping: 1.0 / 32.0,
         keeps_first: true,
-        free: 1.0 / 32.0,
-        room: Room::DEEP,
+        clearance: Clearance::DEEP,
     };
-    /// The same with drapes that are taken back: where those help they do so at once.
-    pub const TAKEN_BACK: Self = Self { shortest: 1.0 / 16.0, ..Self::FROM_T_POSE };
     /// From one frame of a motion to the next.
     pub const OF_FRAME: Self = Self {
         longest: 1.0,
         shortest: 1.0 / 128.0,
         keeping: 1.0,
         keeps_first: false,
-        free: 0.0,
-        room: Room::AMPLE,
+        clearance: Clearance::AMPLE,
     };
     /// The same from a frame that was not clear.
     pub const OF_CROSSED_FRAME: Self = Self { shortest: 1.0 / 4.0, ..Self::OF_FRAME };

@@ -1,9 +1,9 @@
-//! Room for cloth where a posed body presses into itself.
+//! Clearance for cloth where a posed body presses into itself.
 //!
 //! Skinned bodies do not know contact: the upper arm of a hanging arm lies inside the chest, the thigh of a crouching body
 //! inside the belly. No cloth can be outside of both, and where two parts merely touch there is none for it either. Real flesh
 //! gives way. So does this body, in what the garments have to stay out of: both surfaces step back by half of what is missing
-//! for some room between them. Cloth then lies between the two parts, under the skin that is drawn. A certificate knows
+//! for some clearance between them. Cloth then lies between the two parts, under the skin that is drawn. A certificate knows
 //! nothing of this: it counts against the body as it is drawn.
 
 use rayon::prelude::*;
@@ -15,9 +15,9 @@ use crate::query::{FaceSide, Surface};
 use crate::vec3::{add_scaled, dot};
 
 /// Distance that two parts of the body that look at each other keep (m), for what straight triangles need to go round a limb…
-const ROOM: f64 = 0.006;
+const CLEARANCE: f64 = 0.006;
 /// …and for the two sheets of each garment (m).
-const ROOM_PER_GARMENT: f64 = 0.002;
+const CLEARANCE_PER_GARMENT: f64 = 0.002;
 /// Two surfaces look at each other where their normals have a cosine below this.
 const FACING: f64 = -0.3;
 /// Farthest that the surface of another part is looked for (m).
@@ -31,7 +31,7 @@ const LOOK_OUT: f64 = 1e-6;
 
 /// Where a body gives way: where it lies inside itself, and wherever else two parts are too near to each other for cloth.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Room {
+pub(super) struct Clearance {
     /// By which share where it does not lie inside itself, 0–1.
     pub share: f64,
     /// Whether it also does where it lies so deep inside itself, or at such a slant, that no surface looks back. Cloth that comes
@@ -39,7 +39,7 @@ pub(super) struct Room {
     pub is_deep: bool,
 }
 
-impl Room {
+impl Clearance {
     /// Wherever two surfaces look at each other.
     pub const AMPLE: Self = Self { share: 1.0, is_deep: false };
     /// Everywhere.
@@ -61,33 +61,34 @@ pub(super) struct Before<'a> {
 }
 
 /// A body that has given way.
-pub(super) struct Relief {
+pub(super) struct YieldedBody {
     /// The surface after it.
     pub surface: Surface<f64>,
     /// Vertices that gave way.
     pub gave_way: Vec<bool>,
-    /// By how much (m), with all the room there is.
+    /// By how much (m), with all the clearance there is.
     pub steps: Vec<f64>,
     /// Corners of faces that were inside another part, or crossed one, before.
     pub pinched: Vec<bool>,
 }
 
-impl Relief {
+impl YieldedBody {
     /// Of the body as it is `drawn`, near `garments` garments. `None` where nothing has to give way, or the surface is not
     /// closed and has no inside.
     pub fn of(
         drawn: &BodyObstacle<'_>,
         garments: usize,
-        room: Room,
+        clearance: Clearance,
         before: Option<Before<'_>>,
     ) -> Option<Self> {
         let body = drawn.surface;
-        let (mut steps, pinched) = steps(drawn, ROOM + ROOM_PER_GARMENT * garments as f64, room.is_deep)?;
+        let (mut steps, pinched) =
+            steps(drawn, CLEARANCE + CLEARANCE_PER_GARMENT * garments as f64, clearance.is_deep)?;
         if let Some(Before { steps: before, most }) = before {
             steps.iter_mut().zip(before).for_each(|(step, was)| *step = step.clamp(was - most, was + most));
         }
         let scaled =
-            steps.iter().zip(&pinched).map(|(s, pinched)| if *pinched { *s } else { room.share * s });
+            steps.iter().zip(&pinched).map(|(s, pinched)| if *pinched { *s } else { clearance.share * s });
         let scaled: Vec<f64> = scaled.collect();
         if scaled.iter().all(|s| *s == 0.0) {
             return None;
@@ -101,21 +102,21 @@ impl Relief {
 
 impl<'a> BodyObstacle<'a> {
     /// The body after it gave way. Where it only meets itself because of that, it is to be respected as it was.
-    pub fn relieved(relief: &'a Relief, near: &'a [bool]) -> Self {
-        let mut obstacle = Self::pinched_where(&relief.surface, near, |v| relief.pinched[v as usize]);
-        obstacle.gives_way(relief);
+    pub fn yielded_obstacle(yielded: &'a YieldedBody, near: &'a [bool]) -> Self {
+        let mut obstacle = Self::pinched_where(&yielded.surface, near, |v| yielded.pinched[v as usize]);
+        obstacle.gives_way(yielded);
         obstacle
     }
 
     /// Notes which faces give way.
-    pub fn gives_way(&mut self, relief: &Relief) {
-        self.gave_way = touching(&self.surface.faces, &relief.gave_way);
+    pub fn gives_way(&mut self, yielded: &YieldedBody) {
+        self.gave_way = touching(&self.surface.faces, &yielded.gave_way);
     }
 }
 
 /// How far every vertex steps back, against its normal (m); only those `near` cloth and around them do. Also the corners of
 /// faces inside another part, or crossing one. `None` without an inside.
-fn steps(drawn: &BodyObstacle<'_>, room: f64, is_deep: bool) -> Option<(Vec<f64>, Vec<bool>)> {
+fn steps(drawn: &BodyObstacle<'_>, clearance: f64, is_deep: bool) -> Option<(Vec<f64>, Vec<bool>)> {
     let BodyObstacle { surface, near, tree, .. } = drawn;
     let (positions, faces, union) = (&surface.positions, &surface.faces, drawn.union.as_ref()?);
     // Whether all, or some, of the faces at a vertex are inside another part.
@@ -136,9 +137,9 @@ fn steps(drawn: &BodyObstacle<'_>, room: f64, is_deep: bool) -> Option<(Vec<f64>
         let apart = match is_inside {
             true => facing_surface(tree, faces, v as u32, -DEEPEST, p, n)
                 .or_else(|| is_deep.then(|| -nearest_facing(tree, faces, v as u32, p, n).unwrap_or(DEEPEST))),
-            false => facing_surface(tree, faces, v as u32, room, p, n),
+            false => facing_surface(tree, faces, v as u32, clearance, p, n),
         };
-        apart.map_or(0.0, |apart| (0.5 * (room - apart)).clamp(0.0, LONGEST_STEP))
+        apart.map_or(0.0, |apart| (0.5 * (clearance - apart)).clamp(0.0, LONGEST_STEP))
     };
     let mut steps: Vec<f64> = (0..positions.len()).into_par_iter().with_min_len(256).map(missing).collect();
     for _ in 0..RINGS {
@@ -202,11 +203,11 @@ mod tests {
         shapes::union(&[&ball, &shapes::mapped(&ball, |p| add(p, [apart, 0.0, 0.0]))])
     }
 
-    fn relieved(apart: f64, garments: usize) -> (Surface<f64>, Option<Relief>) {
+    fn yielded_obstacle(apart: f64, garments: usize) -> (Surface<f64>, Option<YieldedBody>) {
         let body = Surface::from_mesh(&balls(apart));
         let near = vec![true; body.positions.len()];
-        let relief = Relief::of(&BodyObstacle::new(&body, &near), garments, Room::AMPLE, None);
-        (body, relief)
+        let yielded = YieldedBody::of(&BodyObstacle::new(&body, &near), garments, Clearance::AMPLE, None);
+        (body, yielded)
     }
 
     /// The least distance of the two balls along the line of their centres, by their vertices.
@@ -221,38 +222,40 @@ mod tests {
     #[test]
     fn parts_that_press_into_each_other_make_room() {
         for (apart, garments) in [(0.19, 1), (0.203, 1), (0.17, 3)] {
-            let (body, relief) = relieved(apart, garments);
-            let relief = relief.unwrap();
-            let room = ROOM + ROOM_PER_GARMENT * garments as f64;
-            assert!(space(&body, apart) < 0.5 * room);
-            let space = space(&relief.surface, apart);
-            assert!((0.9 * room..1.3 * room).contains(&space), "{apart}: {space} of {room}");
-            let moves = body.positions.iter().zip(&relief.surface.positions).map(|(p, q)| norm(sub(*q, *p)));
-            for (moved, gave_way) in moves.zip(&relief.gave_way) {
+            let (body, yielded) = yielded_obstacle(apart, garments);
+            let yielded = yielded.unwrap();
+            let clearance = CLEARANCE + CLEARANCE_PER_GARMENT * garments as f64;
+            assert!(space(&body, apart) < 0.5 * clearance);
+            let space = space(&yielded.surface, apart);
+            assert!((0.9 * clearance..1.3 * clearance).contains(&space), "{apart}: {space} of {clearance}");
+            let moves = body.positions.iter().zip(&yielded.surface.positions).map(|(p, q)| norm(sub(*q, *p)));
+            for (moved, gave_way) in moves.zip(&yielded.gave_way) {
                 assert_eq!(moved > 0.0, *gave_way);
-                assert!(moved <= 0.5 * (0.2 - apart + room) * 1.05 + 1e-9);
+                assert!(moved <= 0.5 * (0.2 - apart + clearance) * 1.05 + 1e-9);
             }
-            let share = relief.gave_way.iter().filter(|g| **g).count() as f64 / relief.gave_way.len() as f64;
+            let share =
+                yielded.gave_way.iter().filter(|g| **g).count() as f64 / yielded.gave_way.len() as f64;
             assert!(share < 0.3, "{share}");
         }
     }
 
-    /// From step to step no vertex goes farther than allowed, and with a share of the room it gives way by that share.
+    /// From step to step no vertex goes farther than allowed, and with a share of the clearance it gives way by that share.
     #[test]
     fn a_body_gives_way_by_and_by_and_by_shares() {
         let body = Surface::from_mesh(&balls(0.19));
         let near = vec![true; body.positions.len()];
         let drawn = BodyObstacle::new(&body, &near);
-        let all = Relief::of(&drawn, 1, Room::AMPLE, None).unwrap();
+        let all = YieldedBody::of(&drawn, 1, Clearance::AMPLE, None).unwrap();
         let (steps, most) = (vec![0.0; body.positions.len()], 0.002);
-        let slow = Relief::of(&drawn, 1, Room::AMPLE, Some(Before { steps: &steps, most })).unwrap();
+        let slow =
+            YieldedBody::of(&drawn, 1, Clearance::AMPLE, Some(Before { steps: &steps, most })).unwrap();
         assert!(all.steps.iter().any(|step| *step > most));
         for (slow, all) in slow.steps.iter().zip(&all.steps) {
             assert_eq!(*slow, all.min(most));
         }
-        let half = Relief::of(&drawn, 1, Room::AMPLE.with_share(0.5), None).unwrap();
-        let moves = |relief: &Relief| -> Vec<f64> {
-            let moved = relief.surface.positions.iter().zip(&body.positions);
+        let half = YieldedBody::of(&drawn, 1, Clearance::AMPLE.with_share(0.5), None).unwrap();
+        let moves = |yielded: &YieldedBody| -> Vec<f64> {
+            let moved = yielded.surface.positions.iter().zip(&body.positions);
             moved.map(|(p, q)| norm(sub(*p, *q))).collect()
         };
         for ((half, all), pinched) in moves(&half).iter().zip(moves(&all)).zip(&all.pinched) {
@@ -268,29 +271,32 @@ mod tests {
         let steps = |apart: f64| {
             let body = Surface::from_mesh(&balls(apart));
             let near = vec![true; body.positions.len()];
-            Relief::of(&BodyObstacle::new(&body, &near), 1, Room::DEEP, None).unwrap().steps
+            YieldedBody::of(&BodyObstacle::new(&body, &near), 1, Clearance::DEEP, None).unwrap().steps
         };
         for apart in [0.199, 0.19, 0.17, 0.15] {
             // Nowhere farther than half of what overlaps along the line of the centres.
             let most = steps(apart).into_iter().fold(0.0, f64::max);
-            assert!(most <= 0.5 * (0.2 - apart + ROOM + ROOM_PER_GARMENT) * 1.05 + 1e-9, "{apart}: {most}");
+            assert!(
+                most <= 0.5 * (0.2 - apart + CLEARANCE + CLEARANCE_PER_GARMENT) * 1.05 + 1e-9,
+                "{apart}: {most}"
+            );
         }
     }
 
     #[test]
     fn what_is_apart_open_or_far_from_cloth_stays() {
-        assert!(relieved(0.25, 1).1.is_none());
+        assert!(yielded_obstacle(0.25, 1).1.is_none());
         let open = Surface::from_mesh(&shapes::grid(0.1, 0.1, 4, 4));
         let near = vec![true; open.positions.len()];
-        assert!(Relief::of(&BodyObstacle::new(&open, &near), 1, Room::AMPLE, None).is_none());
+        assert!(YieldedBody::of(&BodyObstacle::new(&open, &near), 1, Clearance::AMPLE, None).is_none());
         let body = Surface::from_mesh(&balls(0.19));
         let far = vec![false; body.positions.len()];
-        assert!(Relief::of(&BodyObstacle::new(&body, &far), 1, Room::AMPLE, None).is_none());
+        assert!(YieldedBody::of(&BodyObstacle::new(&body, &far), 1, Clearance::AMPLE, None).is_none());
         // Near each other, but not inside.
         let body = Surface::from_mesh(&balls(0.203));
         let near = vec![true; body.positions.len()];
         let drawn = BodyObstacle::new(&body, &near);
-        assert!(Relief::of(&drawn, 1, Room::AMPLE, None).is_some());
-        assert!(Relief::of(&drawn, 1, Room::AMPLE.with_share(0.0), None).is_none());
+        assert!(YieldedBody::of(&drawn, 1, Clearance::AMPLE, None).is_some());
+        assert!(YieldedBody::of(&drawn, 1, Clearance::AMPLE.with_share(0.0), None).is_none());
     }
 }

@@ -1,5 +1,4 @@
 use super::super::RestGarment;
-use super::super::unfold::tests::folded_at;
 use super::*;
 use crate::contact::TriangleTree;
 use crate::mesh::TriMesh;
@@ -19,7 +18,6 @@ fn rising(size: f64) -> (TriMesh, impl Fn(f64) -> Result<PathSample, ResolveErro
         Ok(PathSample {
             body: Arc::new(Surface::from_mesh(&knee)),
             draped: vec![draped.clone()],
-            skinned: vec![draped.clone()],
             transforms: vec![IDENTITY; draped.len()],
         })
     };
@@ -44,12 +42,17 @@ fn a_rising_knee_takes_the_sheet_along() {
     let layers = [Layer { garment: &garment, positions: &stage.draped[0] }];
     let settings = ResolveSettings::default();
     let follow = |end: &Body<'_>| {
-        let strides = Strides::FROM_T_POSE;
-        let way =
-            Way { layers: &layers, end, settings: &settings, budget: &Budget::new(&settings, 1), strides };
+        let step_lengths = StepLengths::FROM_T_POSE;
+        let path = Path {
+            layers: &layers,
+            end,
+            settings: &settings,
+            budget: &Budget::new(&settings, 1),
+            step_lengths,
+        };
         let first = stage_at(0.0).unwrap();
         let positions = first.draped.clone();
-        let (followed, steps) = way.follow(untouched(first, positions), &stage_at).unwrap();
+        let (followed, steps) = path.continue_from(untouched(first, positions), &stage_at).unwrap();
         assert!(steps >= 8, "{steps}");
         followed.unwrap()
     };
@@ -101,7 +104,7 @@ fn what_can_be_mended_at_once_is_not_followed_and_what_is_late_is_given_up() {
     let settings = ResolveSettings::default();
     let shallow = stage_at(0.3).unwrap();
     let layers = [Layer { garment: &garment, positions: &shallow.draped[0] }];
-    let resolved = resolve_along(&shallow.body, &layers, &shallow.skinned, &settings, &stage_at).unwrap();
+    let resolved = resolve_along(&shallow.body, &layers, &settings, &stage_at).unwrap();
     assert!(resolved.certificate.is_clear() && resolved.steps == 0);
     let first = untouched(stage_at(0.0).unwrap(), shallow.draped.clone());
     let settings = ResolveSettings { time: Some(Duration::ZERO), ..settings };
@@ -119,7 +122,7 @@ fn what_its_budget_does_not_clear_says_so() {
     let resolved = |total_rounds| {
         let settings = ResolveSettings { total_rounds, ..ResolveSettings::default() };
         let on_the_way = |share| stage_at(0.6 * share);
-        resolve_along(&stage.body, &layers, &stage.skinned, &settings, on_the_way).unwrap()
+        resolve_along(&stage.body, &layers, &settings, on_the_way).unwrap()
     };
     let stopped = resolved(1);
     assert!(stopped.certificate.is_stopped && !stopped.certificate.is_clear());
@@ -207,40 +210,4 @@ fn what_does_not_fit_is_refused() {
     let few = resolve_after(before, &body, &layers, &ResolveSettings::default(), few_at);
     let expected = sheet.vertex_count();
     assert_eq!(few.err(), Some(ResolveError::Transforms { expected, found: expected - 1 }));
-}
-
-/// A sheet that lies folded over a ball. Laid out it is clear of the ball where it may be lifted, and is in it otherwise.
-#[test]
-fn what_only_the_drape_folds_is_laid_out_unless_that_leaves_crossings() {
-    let grid = shapes::irregular_grid(0.4, 0.4, 24, 24, 0.25, 4);
-    let sheet = shapes::mapped(&grid, |[x, y, _]| [x - 0.2, 0.0, y - 0.2]);
-    let ball =
-        Surface::from_mesh(&shapes::mapped(&shapes::icosphere(0.08, 3), |p| add(p, [0.0, -0.03, 0.0])));
-    let folded = |p: &[f64; 3]| {
-        let [x, y, z] = folded_at(*p, [0.0; 3]);
-        [x, y + 0.06 * (-(x * x + z * z) / 0.0081).exp(), z]
-    };
-    let draped: Vec<[f64; 3]> = sheet.positions().iter().map(folded).collect();
-    let skinned = vec![sheet.positions().to_vec()];
-    let garment = RestGarment::new(&sheet);
-    let layers = [Layer { garment: &garment, positions: &draped }];
-    let along = |settings: ResolveSettings| {
-        let no_way = |_| Err(ResolveError::EmptyBody);
-        resolve_along(&ball, &layers, &skinned, &ResolveSettings { steps: 0, ..settings }, no_way).unwrap()
-    };
-
-    let free = along(ResolveSettings::default());
-    assert!(free.certificate.is_clear());
-    assert_eq!(free.certificate.self_triangle_pairs, 0);
-
-    // Where it may hardly be moved the sheet is better left folded: laid out, the ball is deep in it.
-    let narrow = ResolveSettings { farthest: 5e-4, loosened: 1.1, ..ResolveSettings::default() };
-    let held = along(narrow);
-    assert!(held.certificate.is_clear());
-    assert!(held.certificate.self_triangle_pairs > 20, "{}", held.certificate.self_triangle_pairs);
-    assert!(held.garments[0].largest_move < 5e-3, "{}", held.garments[0].largest_move);
-
-    // Strict limits leave the fold alone from the start.
-    let strict = along(ResolveSettings { loosened: 1.0, ..ResolveSettings::default() });
-    assert!(strict.certificate.self_triangle_pairs > 0);
 }

@@ -21,8 +21,8 @@ use std::time::Instant;
 pub(super) const TIMES: usize = 20;
 /// Most moves in a frame of a motion: what is left is for the next one.
 pub(super) const TIMES_IN_FRAME: usize = 2;
-/// Where easing edges that are too long lowers the energy by a smaller share of what it had risen by, those that are too short
-/// are eased as well, which crumples cloth a little; where that lowers it by less, it ends.
+/// Where relaxing edges that are too long lowers the energy by a smaller share of what it had risen by, those that are too short
+/// are relaxed as well, which crumples cloth a little; where that lowers it by less, it ends.
 const LEAST_GAIN: f64 = 0.02;
 /// Passes over the edges in a move.
 const PASSES: usize = 20;
@@ -38,7 +38,7 @@ impl Resolved {
     /// Lowers the strain energy where it has risen from that of `layers`, by at most so many moves (`times`) of what was moved
     /// before, none of which makes an intersection. Strict limits (`settings.loosened`) allow none of this, nor does a `budget` of which
     /// the time is over.
-    pub(super) fn ease(
+    pub(super) fn relax_strain(
         &mut self,
         drawn: &BodyObstacle<'_>,
         layers: &[Layer<'_>],
@@ -59,14 +59,14 @@ impl Resolved {
         let mut positions = self.positions.concat();
         positions.extend(&surface.positions);
         let mut filter = StepFilter::new(&mesh, &positions);
-        Easing::new(&outfit, settings).ease(&mut filter, &mut positions, times, is_late);
-        let eased: Vec<Vec<[f64; 3]>> =
+        StrainRelaxation::new(&outfit, settings).relax_strain(&mut filter, &mut positions, times, is_late);
+        let relaxed: Vec<Vec<[f64; 3]>> =
             (0..outfit.len()).map(|g| outfit.part(&positions, g).to_vec()).collect();
-        if eased != self.positions {
+        if relaxed != self.positions {
             let clock = Instant::now();
-            self.certificate = certified(drawn, layers, &eased);
-            self.certificate_time += clock.elapsed();
-            self.positions = eased;
+            self.certificate = certified(drawn, layers, &relaxed);
+            budget.count_certificate(clock);
+            self.positions = relaxed;
         }
     }
 }
@@ -83,7 +83,7 @@ pub(super) fn contact_mesh<'a>(
 }
 
 /// Garments whose edges give back what they can.
-pub(super) struct Easing<'a> {
+pub(super) struct StrainRelaxation<'a> {
     /// The garments as they were before the post-process.
     outfit: &'a Outfit<'a>,
     /// What elements stay apart (m).
@@ -92,14 +92,14 @@ pub(super) struct Easing<'a> {
     only_stretched: bool,
 }
 
-impl<'a> Easing<'a> {
+impl<'a> StrainRelaxation<'a> {
     pub fn new(outfit: &'a Outfit<'a>, settings: &ResolveSettings) -> Self {
         Self { outfit, margin: settings.trigger * settings.gap, only_stretched: true }
     }
 
     /// Eases the garments at the start of `positions`, those of the `filter`, until their strain energy is what it was before
     /// the post-process, a move gains too little, or `is_late`.
-    pub fn ease(
+    pub fn relax_strain(
         mut self,
         filter: &mut StepFilter<'_>,
         positions: &mut Vec<[f64; 3]>,
@@ -117,14 +117,14 @@ impl<'a> Easing<'a> {
             if now <= before || is_late() {
                 break;
             }
-            let mut eased = self.moved(&edges, &may_move, positions);
-            filter.step(positions, &mut eased, self.margin);
-            let then = self.strain(&eased);
+            let mut relaxed = self.moved(&edges, &may_move, positions);
+            filter.step(positions, &mut relaxed, self.margin);
+            let then = self.strain(&relaxed);
             let gain = (now - then) / (now - before);
             if gain > 0.0 {
-                (*positions, now) = (eased, then);
+                (*positions, now) = (relaxed, then);
             } else {
-                filter.step_freely(&eased, positions);
+                filter.step_freely(&relaxed, positions);
             }
             if gain < LEAST_GAIN && !std::mem::take(&mut self.only_stretched) {
                 break;
@@ -231,7 +231,7 @@ mod tests {
         assert_eq!(certificate.pairs(), 0);
         let mut resolved = Resolved { positions: crumpled, certificate, ..Resolved::default() };
         with_drawn(&body, &layers, |drawn| {
-            resolved.ease(
+            resolved.relax_strain(
                 &drawn,
                 &layers,
                 &ResolveSettings::default(),
@@ -262,7 +262,7 @@ mod tests {
             let certificate = certify(&body, &at(&layers, &positions)).unwrap();
             let mut resolved = Resolved { positions, certificate, ..Resolved::default() };
             with_drawn(&body, &layers, |drawn| {
-                resolved.ease(&drawn, &layers, &settings, &Budget::new(&settings, 1), TIMES);
+                resolved.relax_strain(&drawn, &layers, &settings, &Budget::new(&settings, 1), TIMES);
             });
             assert_eq!(resolved.positions[0] != *now, is_eased);
         }

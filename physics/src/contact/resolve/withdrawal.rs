@@ -1,31 +1,31 @@
-//! Where cloth lies in room that the body only made for it, tries to do without: the body gives way no more than where it lies
+//! Where cloth lies in clearance that the body only made for it, tries to do without: the body gives way no more than where it lies
 //! inside itself.
 
 use super::body::Body;
 use super::budget::Budget;
+use super::clearance::Clearance;
 use super::count::certified;
 use super::garment::at;
 use super::outfit::Outfit;
-use super::relief::Room;
 use super::sides::Sides;
 use super::untangle::{untangled, untangled_keeping};
 use super::{Layer, ResolveSettings, Resolved};
 
-/// Longest and shortest step, as shares of the room that the body made, by which it is taken back.
+/// Longest and shortest step, as shares of the clearance that the body made, by which it is taken back.
 const STEPS: (f64, f64) = (1.0 / 4.0, 1.0 / 32.0);
 /// Gaps with which that is tried, as shares of the one asked for: what is narrow holds more sheets that lie closer to each other.
 const GAPS: [f64; 2] = [1.0, 0.3];
 
-/// A body that takes back the room it made.
-pub(super) struct ClosingIn<'a, 'b> {
+/// A body that takes back the clearance it made.
+pub(super) struct ClearanceWithdrawal<'a, 'b> {
     pub body: &'a Body<'b>,
     /// The garments as they were before all of it.
     pub layers: &'a [Layer<'a>],
-    pub room: Room,
+    pub clearance: Clearance,
     pub budget: &'a Budget,
 }
 
-impl ClosingIn<'_, '_> {
+impl ClearanceWithdrawal<'_, '_> {
     /// Takes what comes of it if fewer pairs are left than in the `best` so far.
     pub fn improve(&self, best: &mut Resolved, settings: &ResolveSettings) {
         for share in GAPS {
@@ -42,10 +42,11 @@ impl ClosingIn<'_, '_> {
     fn at_once(&self, best: &mut Resolved, settings: &ResolveSettings) {
         let apart = (best.certificate.layer_triangle_pairs == 0).then(|| best.positions.clone());
         let now = at(self.layers, &best.positions);
-        let none = self.room.with_share(0.0);
-        let closer = self.body.with_room(none, |obstacle| untangled(obstacle, &now, settings, self.budget));
+        let none = self.clearance.with_share(0.0);
+        let closer =
+            self.body.with_clearance(none, |obstacle| untangled(obstacle, &now, settings, self.budget));
         let certificate = certified(&self.body.drawn, self.layers, &closer.positions);
-        best.prefer(closer.positions, certificate);
+        best.prefer(self.layers, closer.positions, certificate);
         if let Some(apart) = apart.filter(|_| !best.certificate.is_clear()) {
             self.slowly(best, apart, settings);
         }
@@ -59,7 +60,7 @@ impl ClosingIn<'_, '_> {
             let next = f64::max(share - step, 0.0);
             let sides = Sides::of(&outfit, &now.concat(), None);
             let before = at(self.layers, &now);
-            let found = self.body.with_room(self.room.with_share(next), |obstacle| {
+            let found = self.body.with_clearance(self.clearance.with_share(next), |obstacle| {
                 untangled_keeping(Some(&sides), obstacle, &before, settings, self.budget)
             });
             let certificate = certified(&self.body.drawn, self.layers, &found.positions);
@@ -69,7 +70,7 @@ impl ClosingIn<'_, '_> {
             } else {
                 step *= 0.5;
             }
-            best.prefer(found.positions, certificate);
+            best.prefer(self.layers, found.positions, certificate);
         }
     }
 }

@@ -28,7 +28,7 @@ const SMOOTHED_RINGS: usize = 4;
 
 /// A vertex and the sheet of an inner garment it has to stay over.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Over {
+pub(super) struct LayerConstraint {
     pub vertex: u32,
     /// Packed corners of the inner garment's face, and the place in it.
     pub face: [u32; 3],
@@ -38,7 +38,7 @@ pub(super) struct Over {
     pub height: f64,
 }
 
-impl Over {
+impl LayerConstraint {
     pub fn contact(&self, gap: f64) -> Contact {
         Contact::vertex_over(self.vertex, (self.face, self.barycentric), self.normal, gap)
     }
@@ -46,13 +46,13 @@ impl Over {
 
 /// Every vertex with a sheet of an inner garment less than `reach` above it or less than `watch` below it.
 /// `trees` are those of the garments, `outward` the direction away from the body, zero where there is none.
-pub(super) fn all_over(
+pub(super) fn layer_constraints(
     outfit: &Outfit<'_>,
     trees: &[TriangleTree<'_>],
     positions: &[[f64; 3]],
     outward: &[[f64; 3]],
     (reach, watch): (f64, f64),
-) -> Vec<Over> {
+) -> Vec<LayerConstraint> {
     let end = outfit.vertex_count() as u32;
     (0..outfit.len().saturating_sub(1))
         .flat_map(|inner| {
@@ -74,7 +74,7 @@ fn look(
     outward: &[[f64; 3]],
     vertex: u32,
     (reach, watch): (f64, f64),
-) -> Option<Over> {
+) -> Option<LayerConstraint> {
     let (p, away) = (positions[vertex as usize], outward[vertex as usize]);
     if away == [0.0; 3] {
         return None;
@@ -119,11 +119,11 @@ impl OutermostSheet {
     }
 
     /// What `vertex` has to stay over.
-    pub fn over(self, vertex: u32, outfit: &Outfit<'_>, positions: &[[f64; 3]]) -> Option<Over> {
+    pub fn over(self, vertex: u32, outfit: &Outfit<'_>, positions: &[[f64; 3]]) -> Option<LayerConstraint> {
         let (above, f, barycentric) = self.found?;
         let face = outfit.faces[f as usize];
         let normal = sheet_normal(&face.map(|v| positions[v as usize]), self.away);
-        Some(Over { vertex, face, barycentric, normal, height: -above * dot(normal, self.away) })
+        Some(LayerConstraint { vertex, face, barycentric, normal, height: -above * dot(normal, self.away) })
     }
 }
 
