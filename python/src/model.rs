@@ -102,7 +102,7 @@ impl WantedGarment {
                 catalog.place(&self.name, mesh, draper.body(), fit, &hints)?
             }
         };
-        source.set_material(material);
+        source.add_material(material);
         Ok(source)
     }
 }

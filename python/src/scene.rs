@@ -185,10 +185,10 @@ impl Scene {
             return Err(refused_text(format!("{key} {what}\nhelp: {hint}")));
         }
         let mut materials: Vec<GarmentMaterial> = to_value(materials, "materials")?;
-        if materials.len() > count {
+        if !materials.is_empty() && materials.len() != count {
             let given = materials.len();
             return Err(refused_text(format!(
-                "{given} materials for {count} garments; hint: at most one for each"
+                "{given} materials for {count} garments; hint: one for each, None where it is that of the losses"
             )));
         }
         for (i, material) in materials.iter().enumerate() {

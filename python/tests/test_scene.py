@@ -124,17 +124,17 @@ def test_threads_may_share_a_scene():
 def test_a_garment_may_be_of_another_material():
     posed, canonical = state()
     usual, _, _ = scene()(posed, canonical)
-    same, _, _ = scene(materials=[None])(posed, canonical)
+    same, _, _ = scene(materials=[None, {}])(posed, canonical)
     assert same == usual
     heavy, _, _ = scene(materials=[None, {"density": 4260.0}])(posed, canonical)
     both, _, _ = scene({**ALL, "material": {"density": 4260.0}})(posed, canonical)
     assert usual["gravity"] != heavy["gravity"] != both["gravity"]
     assert heavy["strain"] == usual["strain"]
-    thick, _, _ = scene(materials=[{"thickness": 0.01}])(posed, canonical)
+    thick, _, _ = scene(materials=[{"thickness": 0.01}, None])(posed, canonical)
     assert thick["body_collision"] > usual["body_collision"] and thick["layer_collision"] > usual["layer_collision"]
     with pytest.raises(clothcombo.Error, match="garment 1: energy setting `material.density`"):
         scene(materials=[None, {"density": -1.0}])
     with pytest.raises(clothcombo.Error, match="3 materials for 2 garments"):
         scene(materials=[None] * 3)
     with pytest.raises(clothcombo.Error, match="unknown field `weight`"):
-        scene(materials=[{"weight": 1.0}])
+        scene(materials=[{"weight": 1.0}, None])

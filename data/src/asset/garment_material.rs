@@ -47,6 +47,18 @@ impl GarmentMaterial {
         }
     }
 
+    /// The same with what only `other` says.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            thickness: self.thickness.or(other.thickness),
+            density: self.density.or(other.density),
+            lambda: self.lambda.or(other.lambda),
+            mu: self.mu.or(other.mu),
+            bending_stiffness: self.bending_stiffness.or(other.bending_stiffness),
+        }
+    }
+
     /// Whether cloth can be made of it.
     ///
     /// # Errors
@@ -118,6 +130,8 @@ mod tests {
         assert_eq!(made, Material { thickness: 0.003, density: 120.0, ..base });
         assert_eq!(material.to_string().parse(), Ok(material));
         assert!(!material.is_empty() && GarmentMaterial::default().is_empty());
+        let of_folder: GarmentMaterial = "thickness=0.001,mu=7".parse().unwrap();
+        assert_eq!(material.or(of_folder).to_string(), "thickness=0.003,density=120,mu=7");
     }
 
     #[test]

@@ -22,7 +22,8 @@ pub struct GarmentEnergies<T: Real> {
 }
 
 impl<T: Real> GarmentEnergies<T> {
-    /// Prepares the energies of a garment with rest shape `rest`, made of the settings' material; `holding`: whether it hangs from nothing and is held.
+    /// Prepares the energies of a garment with rest shape `rest`, made of the settings' material; `holding`: whether it hangs
+    /// from nothing and is held.
     ///
     /// # Errors
     /// [`EnergyError::Setting`] for a setting out of range, [`EnergyError::TopologyMismatch`] for the topology of another

@@ -130,7 +130,10 @@ impl EnergySettings {
     /// than ε.
     pub(super) fn for_pair(&self, thickness: [f64; 2]) -> Self {
         let [inner, outer] = thickness;
-        Self { layer_collision_epsilon: self.layer_collision_epsilon.max(0.5 * (inner + outer)), ..*self }
+        let epsilon = self.layer_collision_epsilon.max(0.5 * (inner + outer));
+        // A gate that is less deep than contact begins would cut it off with a jump.
+        let layer_gate = self.layer_gate.map(|gate| LayerGate { depth: gate.depth.max(epsilon), ..gate });
+        Self { layer_collision_epsilon: epsilon, layer_gate, ..*self }
     }
 
     /// Checks every value.

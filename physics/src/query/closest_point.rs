@@ -118,6 +118,11 @@ impl ClosestPoint {
         Some(self.surface_point(face, self.on_face(face, p)))
     }
 
+    /// Whether there is no face to be closest to.
+    pub(super) fn is_empty(&self) -> bool {
+        self.leaves.iter().all(Option::is_none)
+    }
+
     /// What was `found` on a face, with its pseudo-normal.
     pub(super) fn surface_point(&self, face: u32, found: TrianglePoint) -> SurfacePoint {
         SurfacePoint {

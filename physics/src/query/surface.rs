@@ -160,7 +160,7 @@ impl<T: Real> Surface<T> {
             match union.kept().project_within(q, reach) {
                 Some(found) => return signed_gap(p, &found, union.is_inside(q, &found), union.kept()),
                 // A winding number costs less than a distance.
-                None if union.winding_number(q) < 1 => {
+                None if union.winding_number(q) < 1 && !union.kept().is_empty() => {
                     return Gap { gap: T::from_f64(reach), gradient: vec3::zero(), vertex: 0 };
                 }
                 None => (),

@@ -48,6 +48,7 @@ class Garment:
         keep: Optional[str] = None,
         join_seams: Optional[str] = None,
         from_body: Optional[File] = None,
+        material: Optional[dict[str, float]] = None,
     ) -> None: ...
 
 class DrapedGarment:

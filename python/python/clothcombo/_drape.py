@@ -17,7 +17,7 @@ class Garment:
     Hints as of `clothcombo fit`: `unit`, `up`, `arms`, `legs` (degrees), `category`, `offset` (m), `turn` (degrees), `keep`,
     `join_seams` ("5mm"), `from_body`. A garment with a hint is always fitted. `material` is a dict of `thickness` (m), `density`
     (kg/m³), `lambda`, `mu` (Pa) and `bending_stiffness` (J/rad²) where they are not those that the model was trained with: the
-    networks do not see them; refinement, post-process and energies do.
+    refinement knows them, the networks only how thick the garments below are.
     """
 
     def __init__(self, source, name=None, **hints):

@@ -50,9 +50,9 @@ pub struct Arguments {
     #[arg(long)]
     quick: bool,
     /// Random outfits of 1 to 6 garments whose certificates are counted before and after the post-process; seconds to a minute
-    /// each
-    #[arg(long, default_value_t = 0, value_name = "COUNT")]
-    outfits: usize,
+    /// each [default: 50 with --only certificates, else none]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(1..))]
+    outfits: Option<u16>,
     /// Writes body and garments (rest, draped, resolved) of each of these outfits as OBJ under this folder
     #[arg(long, value_name = "DIR", requires = "outfits", value_parser = folder_to_make())]
     meshes: Option<PathBuf>,
@@ -80,6 +80,8 @@ fn named(text: &str) -> Result<(String, PathBuf), String> {
 }
 
 /// Names of the files that make a report.
+/// Outfits of the part `certificates` where it is asked for without their number: a quarter of an hour.
+const OUTFITS: usize = 50;
 const JSON: &str = "eval.json";
 const MARKDOWN: &str = "eval.md";
 const HTML: &str = "report.html";
@@ -108,7 +110,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     // Now, not after all the work; nothing is made before that.
     check_writable(folder).into_diagnostic().wrap_err_with(|| format!("{}", folder.display()))?;
 
-    let counts = SceneCounts::new(arguments.quick, arguments.outfits);
+    let asks_for_certificates = arguments.only.iter().any(|part| part == "certificates");
+    let outfits = arguments.outfits.map_or(if asks_for_certificates { OUTFITS } else { 0 }, usize::from);
+    let counts = SceneCounts::new(arguments.quick, outfits);
     let bar = progress_bar(0, "{bar:30} {pos}/{len} · {elapsed} · {msg}");
     let clock = Instant::now();
     let is_wanted = |key: &str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == key);

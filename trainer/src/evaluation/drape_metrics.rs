@@ -77,8 +77,8 @@ pub fn measure(scene: &PreparedScene, drapes: &[Draped]) -> Vec<DrapeMetrics> {
     drapes.iter().map(measured).collect()
 }
 
-/// The two collisions of `scene` as the paper prints them, and nothing else: nearest vertex, ε = 2 mm, every two
-/// garments, no gate, no scaling with the number of vertices.
+/// The two collisions of `scene` as the paper prints them, and nothing else: nearest vertex, ε = 2 mm (half the thickness
+/// of cloth that is thicker), every two garments, no gate, no scaling with the number of vertices.
 fn paper_collisions(scene: &SceneEnergy<f32>) -> SceneEnergy<f32> {
     let printed = EnergySettings::printed();
     let only = |term: Term| {

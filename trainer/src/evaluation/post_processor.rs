@@ -46,7 +46,8 @@ impl<'a> PostProcessor<'a> {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let garment = scene.sample.garments.iter().zip(&scene.garments);
         let rest = garment.map(|(&g, garment)| {
-            known.entry(g).or_insert_with(|| Arc::new(RestGarment::new(&garment.garment.rest))).clone()
+            let made = || RestGarment::of_material(&garment.garment.rest, garment.energies.material());
+            known.entry(g).or_insert_with(|| Arc::new(made())).clone()
         });
         DrapedScene {
             post_processor: self,

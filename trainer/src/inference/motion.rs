@@ -136,8 +136,8 @@ mod tests {
     }
 
     #[test]
-    fn after_a_frame_with_flaws_crossings_are_allowed_but_no_growing_tears() {
-        for (certificate, at_first, after_crossings, after_tears) in [
+    fn after_a_frame_with_flaws_crossings_are_allowed_but_no_growing_strain() {
+        for (certificate, at_first, after_crossings, after_strain) in [
             (left(0, 0.4), true, true, true),
             (left(0, -0.4), true, true, true),
             (left(3, 0.0), false, true, true),
@@ -153,7 +153,7 @@ mod tests {
             );
             assert_eq!(
                 RetryPolicy::after(&left(0, 1.0)).is_met(&certificate),
-                after_tears,
+                after_strain,
                 "{certificate:?}"
             );
             assert!(RetryPolicy::ALL.is_met(&certificate));

@@ -95,7 +95,8 @@ fn smoothed_frame(
         let is_no_worse = now.body_triangle_pairs <= before.body_triangle_pairs
             && now.layer_triangle_pairs <= before.layer_triangle_pairs
             && now.self_triangle_pairs <= before.self_triangle_pairs
-            && now.excess_strain() <= before.excess_strain();
+            && now.excess_strain() <= before.excess_strain()
+            && now.defects() <= before.defects();
         if is_no_worse {
             return Ok(Some((number, candidate)));
         }

@@ -58,11 +58,9 @@ impl GivenGarment {
         Placement { body, always_fit, hints, check: &OnceLock::new() }.read(path)
     }
 
-    /// Says what it is made of, if `material` says anything: instead of what its folder says.
-    pub fn set_material(&mut self, material: GarmentMaterial) {
-        if !material.is_empty() {
-            self.garment.material = material;
-        }
+    /// Says what it is made of: constants of `material` come before those of its folder.
+    pub fn add_material(&mut self, material: GarmentMaterial) {
+        self.garment.material = material.or(self.garment.material);
     }
 
     /// The OBJ file it was read from, if it was one.
@@ -282,7 +280,7 @@ impl GarmentCatalog {
         if must_fit {
             let mut source = Placement { always_fit: Some(true), ..placement }.read(&listed.path)?;
             source.garment.name.clone_from(&listed.name);
-            source.set_material(listed.material);
+            source.add_material(listed.material);
             return Ok(source);
         }
         let garment = made?;

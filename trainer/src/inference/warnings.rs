@@ -31,7 +31,7 @@ impl Draper {
         let differ = |source: &&GivenGarment| !source.garment.material.is_empty();
         for source in sources.iter().filter(differ) {
             tracing::info!(
-                "{} is made of {}; the networks, which do not see it, were trained with thickness={}, density={}, lambda={}, \
+                "{} is made of {}; the networks, which see only the thickness below a garment, were trained with thickness={}, density={}, lambda={}, \
                  mu={}, bending_stiffness={}",
                 source.garment.name,
                 source.garment.material,

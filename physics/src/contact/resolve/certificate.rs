@@ -235,7 +235,7 @@ impl Certificate {
     }
 
     /// How many times over the strain energy has risen by half of what it was: 0 where cloth is merely pulled straight,
-    /// more where it is torn out of shape, which shows.
+    /// more where it is stretched out of shape, which shows.
     pub fn excess_strain(&self) -> usize {
         self.strain_added.map_or(0, |added| (added / EXCESS_STRAIN) as usize)
     }
@@ -277,5 +277,5 @@ pub(super) fn strain_joule(layers: &[Layer<'_>]) -> f64 {
 
 /// Less strain energy than this (J) is rounding of a garment in its rest shape.
 const NO_STRAIN: f64 = 1e-9;
-/// A rise of the strain energy, as a share, from which cloth is torn.
+/// A rise of the strain energy, as a share, from which cloth is visibly stretched.
 const EXCESS_STRAIN: f64 = 0.5;

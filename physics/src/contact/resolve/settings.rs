@@ -27,14 +27,14 @@ pub struct ResolveSettings {
     /// body inside another one) would tear the garment instead of mending it, and is left and listed.
     pub farthest: f64,
     /// Longest that an edge should get, as a share of its length in the input. Default 1.15: cloth gives a little, and a place
-    /// that asks for more is left and listed instead of torn. Contacts come last in a round, so that single edges get longer.
+    /// that asks for more is left and listed. Contacts come last in a round, so that single edges get longer.
     pub stretch: f64,
     /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken if it ends
     /// with none. Where few are left in the end, all is tried again from there and both limits are measured anew. Default 6; 1
     /// for strict limits: no attempt begins where another one ended, and added strain is not
     /// relaxed.
     pub loosened: f64,
-    /// Most steps on a way: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
+    /// Most steps on a path: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
     /// Default 128; 0 mends the drape as it is or not at all.
     pub steps: usize,
     /// Whether nothing lies deeper than half a limb, so that the nearest way out is the right one: true for a small step.

@@ -26,7 +26,7 @@ pub(super) struct ClearanceWithdrawal<'a, 'b> {
 }
 
 impl ClearanceWithdrawal<'_, '_> {
-    /// Takes what comes of it if fewer pairs are left than in the `best` so far.
+    /// Takes what comes of it if it has fewer defects than the `best` so far.
     pub fn improve(&self, best: &mut Resolved, settings: &ResolveSettings) {
         for share in GAPS {
             if best.certificate.narrow_triangle_pairs == 0 || self.budget.is_spent() {

@@ -24,7 +24,7 @@ pub(crate) use separation::closest_on_edges;
 use crate::query::triangle_pair::{has_area, mesh_triangles_intersect};
 use crate::vec3::{add, add_scaled, sub};
 use rayon::prelude::*;
-use separation::{Corners, TrianglePair, stay_apart, triangles_stay_apart};
+use separation::{Corners, NEAREST, TrianglePair, stay_apart, triangles_stay_apart};
 
 /// Halvings of a refused motion before it ends.
 const HALVINGS: u8 = 3;
@@ -204,7 +204,7 @@ impl<'a> StepFilter<'a> {
                     continue;
                 }
                 let (start, end) = (corners_of_faces(from, pair), corners_of_faces(to, pair));
-                if triangles_stay_apart(&start, &end, margin) {
+                if triangles_stay_apart(&start, &end, margin.max(NEAREST)) {
                     continue;
                 }
                 self.mesh.element_pairs(f, g, |pair| {

@@ -44,7 +44,7 @@ const HALVINGS: u32 = 3;
 const TOUCHING: f64 = 1e-9;
 /// A step ends no nearer than this (m), however little room there is: ten times what rounding to f32, or to the digits of an
 /// OBJ file, moves a vertex of a person.
-const NEAREST: f64 = 1e-6;
+pub(super) const NEAREST: f64 = 1e-6;
 /// What f64 rounds the distance between elements of a person by, some times (m).
 const ROUNDING: f64 = 1e-14;
 

@@ -143,7 +143,7 @@ fn brute_force(mesh: &ContactMesh, x: &[[f64; 3]], wanted: &[[f64; 3]], margin: 
         for &(f, g) in &pairs {
             let corners = |f: u32, state: &[[f64; 3]]| mesh.faces[f as usize].map(|v| state[v as usize]);
             let [start, end] = [x, &y].map(|state| [corners(f, state), corners(g, state)]);
-            if triangles_stay_apart(&start, &end, margin) {
+            if triangles_stay_apart(&start, &end, margin.max(NEAREST)) {
                 continue;
             }
             mesh.element_pairs(f, g, |pair| {

@@ -75,7 +75,8 @@ pub struct Arguments {
     #[command(flatten)]
     hints: FitArguments,
     /// What the garments are made of, where that is not what the model was trained on: of thickness (m), density (kg/m³),
-    /// lambda, mu (Pa) and bending_stiffness (J/rad²). The networks do not see it; refinement, post-process and energies do.
+    /// lambda, mu (Pa) and bending_stiffness (J/rad²). The refinement knows it all; of it the networks see how thick the
+    /// garments below are, and the post-process measures strain by it.
     /// Example: --material thickness=0.003,density=150
     #[arg(long, value_name = "KEY=VALUE,…", value_parser = GarmentMaterial::from_str)]
     material: Option<GarmentMaterial>,
@@ -182,7 +183,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let find = |garment: &WantedGarment| {
             let fit = arguments.fit.decided();
             let mut source = catalog.find(&garment.name, draper.body(), fit, &garment.hints)?;
-            source.set_material(garment.material);
+            source.add_material(garment.material);
             Ok::<_, DraperError>(source)
         };
         let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;

@@ -33,7 +33,7 @@ struct Entry {
 }
 
 /// Reads the outfits of `file`. What an outfit does not say about the body is taken from `scene`, and what it does not
-/// say about a garment from `hints`; paths are relative to the file's folder, or to the working folder where there is
+/// say about a garment from `hints` and `material`; paths are relative to the file's folder, or to the working folder where there is
 /// no such file.
 pub(super) fn read(
     file: &Path,
@@ -132,7 +132,7 @@ fn garment(
             let entry: GarmentEntry =
                 table.try_into().map_err(|e: toml::de::Error| e.message().to_owned())?;
             entry.material.check()?;
-            let material = if entry.material.is_empty() { material } else { entry.material };
+            let material = entry.material.or(material);
             Ok(WantedGarment { hints: entry.settings(hints, beside)?, name: entry.file, material })
         }
         other => Err(format!(
@@ -203,7 +203,7 @@ mod tests {
         assert!(tee.name.ends_with("/tee.obj"));
         assert_eq!((tee.hints.unit, tee.hints.keep), (Some(Unit::Cm), Keep::Outer));
         assert_eq!(coat.hints, FitSettings::default());
-        assert_eq!((tee.material.mu, tee.material.density), (Some(9.0), None));
+        assert_eq!((tee.material.mu, tee.material.density), (Some(9.0), Some(300.0)));
         assert_eq!(coat.material.density, Some(300.0));
     }
 

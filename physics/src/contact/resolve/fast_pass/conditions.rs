@@ -20,7 +20,7 @@ const ALONG: f64 = 0.6;
 
 /// Where an outfit is wrong.
 #[derive(Default)]
-pub(super) struct Defects {
+pub(super) struct DefectRegion {
     /// The vertices that may move: those on the wrong side or of triangles that intersect, and their neighbourhood; ascending.
     pub region: Vec<u32>,
     is_in: Vec<bool>,
@@ -32,9 +32,9 @@ pub(super) struct Defects {
 
 impl FastPass<'_> {
     /// What is wrong now. Vertices on the wrong side are looked for from triangles that intersect outward.
-    pub(super) fn defects(&self) -> Defects {
+    pub(super) fn defects(&self) -> DefectRegion {
         let outfit = self.outfit;
-        let mut found = Defects { is_in: vec![false; self.input.len()], ..Defects::default() };
+        let mut found = DefectRegion { is_in: vec![false; self.input.len()], ..DefectRegion::default() };
         let cloth_of = |&(f, g): &(u32, u32)| {
             let other = if self.filter.mesh.is_body(g) { f } else { g };
             [f, other].into_iter().flat_map(|f| outfit.faces[f as usize])
@@ -101,7 +101,7 @@ impl FastPass<'_> {
     }
 
     /// What has to hold in the region of `defects` and next to it.
-    pub(super) fn conditions(&mut self, defects: &Defects) -> Vec<Contact> {
+    pub(super) fn conditions(&mut self, defects: &DefectRegion) -> Vec<Contact> {
         let is_in = &defects.is_in;
         let mesh = self.filter.mesh;
         let is_near = |f: u32| !mesh.is_body(f) && mesh.faces[f as usize].iter().any(|&v| is_in[v as usize]);

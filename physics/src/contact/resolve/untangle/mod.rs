@@ -13,7 +13,7 @@ use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use super::sides::Sides;
 use super::{Layer, ResolveSettings};
-use crate::query::triangle_tree::{KeptTree, TriangleTree};
+use crate::query::triangle_tree::{KeptTree, TriangleTree, self_triangle_pairs};
 use crate::vec3::dot;
 
 /// A half-space is remembered for a vertex that is nearer to it than this (m), or too close: smoothing may carry it there.
@@ -272,7 +272,7 @@ pub(super) struct Untangled {
     pub crossings: usize,
     /// Pairs with the body, where it gives way too.
     pub with_body: usize,
-    /// Pairs of garments with themselves; where contact orientation is kept pinched ones too.
+    /// Pairs of garments with themselves, pinched ones too.
     pub own: usize,
 }
 
@@ -302,11 +302,16 @@ pub(super) fn untangled_keeping(
     let outfit = Outfit::new(layers);
     let mut untangling = Untangling::new(&outfit, body, settings, (budget, sides));
     untangling.run();
-    let positions = (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
-    Untangled {
-        positions,
-        crossings: untangling.crossings(),
-        with_body: untangling.body_crossings(),
-        own: untangling.own_crossings(),
-    }
+    let positions: Vec<Vec<_>> =
+        (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
+    // Where contact orientation is kept, pinched pairs have been counted already.
+    let own = match settings.self_contact && sides.is_none() {
+        true => {
+            let garments = layers.iter().zip(&positions);
+            garments.map(|(layer, now)| self_triangle_pairs(now, layer.garment.faces()).len()).sum()
+        }
+        false => untangling.own_crossings(),
+    };
+    let (crossings, with_body) = (untangling.crossings(), untangling.body_crossings());
+    Untangled { positions, crossings, with_body, own }
 }
