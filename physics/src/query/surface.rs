@@ -297,7 +297,7 @@ mod tests {
             }
             assert!((wide.gap(p, Distance::Union).gap - exact.gap).abs() < 1e-7);
         }
-        assert!(inside > 50 && beyond > 500, "{inside} {beyond}");
+        assert!(inside > 10 && beyond > 500, "{inside} {beyond}");
     }
 
     #[test]
