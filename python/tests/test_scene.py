@@ -130,7 +130,7 @@ def test_a_garment_may_be_of_another_material():
     both, _, _ = scene({**ALL, "material": {"density": 4260.0}})(posed, canonical)
     assert usual["gravity"] != heavy["gravity"] != both["gravity"]
     assert heavy["strain"] == usual["strain"]
-    thick, _, _ = scene(materials=[{"thickness": 0.01}, None])(posed, canonical)
+    thick, _, _ = scene(materials=[{"thickness": 0.016}, None])(posed, canonical)
     assert thick["body_collision"] > usual["body_collision"] and thick["layer_collision"] > usual["layer_collision"]
     with pytest.raises(clothcombo.Error, match="garment 1: energy setting `material.density`"):
         scene(materials=[None, {"density": -1.0}])
