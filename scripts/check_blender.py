@@ -56,8 +56,6 @@ def main():
         check("cache", name, max(np.abs(shown(meshes[name], f) - frames[f]).max() for f in looked_at))
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    # A frame of the scene is one of the motion: then key n of an animation is at frame n.
-    bpy.context.scene.render.fps = 24
     bpy.ops.import_scene.gltf(filepath=str(folder / "scene.glb"))
     meshes = {mesh.name: mesh for mesh in bpy.data.objects if mesh.type == "MESH"}
     for name, frames in caches.items():

@@ -54,7 +54,7 @@ impl Footprint {
         Self { nearest: nearest.into_iter().map(|v| v as u32).collect(), covered }
     }
 
-    /// Thickness (m) of what is worn `below` the garment, each with its own (m), at its vertices `[V]`.
+    /// Thickness (m) of the garments `below` this one, each with its own (m), at the vertices of this one `[V]`.
     pub fn thickness_of<'a>(&self, below: impl Iterator<Item = (&'a Self, f64)>) -> Vec<f32> {
         let mut sum = vec![0.0; self.nearest.len()];
         for (other, thickness) in below {
@@ -67,7 +67,7 @@ impl Footprint {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
     use crate::asset::Category;
     use crate::generate::mannequin;
@@ -75,7 +75,7 @@ pub(super) mod tests {
     use clothcombo_physics::mesh::shapes::tube;
 
     /// A tube around the trunk, between two heights (m).
-    pub fn band(radius: f64, low: f64, high: f64) -> Garment {
+    fn band(radius: f64, low: f64, high: f64) -> Garment {
         let mesh = tube(radius, high - low, 40, 20);
         let highest = mesh.positions().iter().map(|p| p[1]).fold(f64::MIN, f64::max);
         let moved = mesh.positions().iter().map(|p| [p[0], p[1] - highest + high, p[2]]).collect();

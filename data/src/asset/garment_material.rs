@@ -26,10 +26,27 @@ pub struct GarmentMaterial {
     pub bending_stiffness: Option<f64>,
 }
 
-/// Thicker than this (m), a sheet without volume says little about it, and it is likely to be in another unit.
-const THICKEST: f64 = 0.02;
+/// Names of the constants with their units, and the most that each can be in cloth: what is more is likely to be in another
+/// unit. 2 cm are a quilt; 10 t/m³ are heavier than a mesh of steel; 10 GPa are stiffer than nylon; a hinge of 1 J/rad² is that of
+/// a millimetre of hard plastic (E h³/12).
+const CONSTANTS: [(&str, &str, f64); 5] = [
+    ("thickness", "m", 0.02),
+    ("density", "kg/m³", 1e4),
+    ("lambda", "Pa", 1e10),
+    ("mu", "Pa", 1e10),
+    ("bending_stiffness", "J/rad²", 1.0),
+];
 
 impl GarmentMaterial {
+    /// In the order of [`CONSTANTS`].
+    fn values(&self) -> [Option<f64>; 5] {
+        [self.thickness, self.density, self.lambda, self.mu, self.bending_stiffness]
+    }
+
+    fn of_values([thickness, density, lambda, mu, bending_stiffness]: [Option<f64>; 5]) -> Self {
+        Self { thickness, density, lambda, mu, bending_stiffness }
+    }
+
     /// Whether it says nothing.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
@@ -50,13 +67,8 @@ impl GarmentMaterial {
     /// The same with what only `other` says.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
-        Self {
-            thickness: self.thickness.or(other.thickness),
-            density: self.density.or(other.density),
-            lambda: self.lambda.or(other.lambda),
-            mu: self.mu.or(other.mu),
-            bending_stiffness: self.bending_stiffness.or(other.bending_stiffness),
-        }
+        let (own, others) = (self.values(), other.values());
+        Self::of_values(std::array::from_fn(|i| own[i].or(others[i])))
     }
 
     /// Whether cloth can be made of it.
@@ -66,11 +78,13 @@ impl GarmentMaterial {
     pub fn check(&self) -> Result<(), String> {
         let settings = EnergySettings { material: self.over(&Material::default()), ..Default::default() };
         settings.check().map_err(|e| e.to_string())?;
-        match self.thickness {
-            Some(thickness) if thickness > THICKEST => {
-                Err(format!("material.thickness is {thickness}, thicker than {THICKEST} m; hint: in metres"))
-            }
-            _ => Ok(()),
+        let is_too_much = |(value, (_, _, most)): &(Option<f64>, _)| value.is_some_and(|value| value > *most);
+        match self.values().into_iter().zip(CONSTANTS).find(is_too_much) {
+            Some((value, (name, unit, most))) => Err(format!(
+                "material.{name} is {}, more than any cloth's ({most} {unit}); hint: it is in {unit}",
+                value.unwrap_or_default()
+            )),
+            None => Ok(()),
         }
     }
 }
@@ -80,25 +94,23 @@ impl FromStr for GarmentMaterial {
 
     /// Of `thickness=0.002,density=300`.
     fn from_str(text: &str) -> Result<Self, String> {
-        let known = "thickness (m), density (kg/m³), lambda (Pa), mu (Pa), bending_stiffness (J/rad²)";
-        let mut material = Self::default();
+        let known = CONSTANTS.map(|(name, unit, _)| format!("{name} ({unit})")).join(", ");
+        let mut values = [None; 5];
         for part in text.split(',') {
             let (key, value) = part
                 .split_once('=')
                 .ok_or_else(|| format!("'{part}' is not of the form key=value; keys: {known}"))?;
+            let key = key.trim();
             let value: f64 = value.trim().parse().map_err(|_| format!("{key}: '{value}' is no number"))?;
-            let slot = match key.trim() {
-                "thickness" => &mut material.thickness,
-                "density" => &mut material.density,
-                "lambda" => &mut material.lambda,
-                "mu" => &mut material.mu,
-                "bending_stiffness" => &mut material.bending_stiffness,
-                other => return Err(format!("'{other}' is no constant of a material; known: {known}")),
-            };
-            if slot.replace(value).is_some() {
+            let place = CONSTANTS
+                .iter()
+                .position(|(name, ..)| *name == key)
+                .ok_or_else(|| format!("'{key}' is no constant of a material; known: {known}"))?;
+            if values[place].replace(value).is_some() {
                 return Err(format!("{key} is given twice"));
             }
         }
+        let material = Self::of_values(values);
         material.check()?;
         Ok(material)
     }
@@ -106,14 +118,8 @@ impl FromStr for GarmentMaterial {
 
 impl fmt::Display for GarmentMaterial {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let constants = [
-            ("thickness", self.thickness),
-            ("density", self.density),
-            ("lambda", self.lambda),
-            ("mu", self.mu),
-            ("bending_stiffness", self.bending_stiffness),
-        ];
-        let given = constants.iter().filter_map(|(key, value)| value.map(|value| format!("{key}={value}")));
+        let constants = CONSTANTS.iter().zip(self.values());
+        let given = constants.filter_map(|((name, ..), value)| value.map(|value| format!("{name}={value}")));
         f.write_str(&given.collect::<Vec<_>>().join(","))
     }
 }
@@ -144,7 +150,9 @@ mod tests {
             ("thickness=0", "greater than 0"),
             ("density=-1", "not negative"),
             ("lambda=nan", "finite"),
-            ("thickness=3", "in metres"),
+            ("thickness=3", "it is in m"),
+            ("bending_stiffness=1e300", "more than any cloth's (1 J/rad²)"),
+            ("density=0.2,mu=1e12", "material.mu"),
         ] {
             let message = text.parse::<GarmentMaterial>().unwrap_err();
             assert!(message.contains(part), "{message}");

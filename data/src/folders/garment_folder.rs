@@ -307,7 +307,7 @@ mod tests {
             (format!("{entry}material = {{ weight = 1.0 }}\n"), ["garments.toml", "line 3", "`weight`"]),
             (
                 format!("{entry}material = {{ thickness = 3.0 }}\n"),
-                ["garments.toml", "garment 1", "in metres"],
+                ["garments.toml", "garment 1", "more than any cloth's"],
             ),
             ("[[garment]]\nfile = \"none.obj\"\n".into(), ["garments.toml", "none.obj", "garment 1"]),
             (format!("{entry}{entry}"), ["garment 2", "'a'", "of 'a.obj'"]),

@@ -34,7 +34,7 @@ impl<T: Real> SceneGarment<T> {
         self.thickness_below.iter().fold(0.0, |most, t| most.max(Real::to_f64(*t)))
     }
 
-    /// Margin between it and the body, or what is worn between them (m).
+    /// Margin between it and the body, or the garments between them (m).
     pub(super) fn body_margin(&self, settings: &EnergySettings) -> f64 {
         settings.body_margin(self.energies.material().thickness)
     }

@@ -49,8 +49,8 @@ pub struct Surface<T: Real> {
     /// Area-weighted unit vertex normals `[V, 3]`; zero where undefined.
     pub normals: Vec<[T; 3]>,
     vertex_index: OnceLock<VertexIndex<T>>,
-    closest_point: OnceLock<Arc<ClosestPoint>>,
-    union_distance: OnceLock<Arc<UnionDistance>>,
+    closest_point: OnceLock<ClosestPoint>,
+    union_distance: OnceLock<UnionDistance>,
     is_closed: OnceLock<bool>,
 }
 
@@ -75,17 +75,6 @@ impl<T: Real> Surface<T> {
         Self::new(positions, mesh.faces().into())
     }
 
-    /// The same surface in `f64`, with the trees that it has: they are `f64` already.
-    pub fn widened(&self) -> Surface<f64> {
-        let positions = self.positions.iter().map(|p| vec3::to_f64(*p)).collect();
-        Surface {
-            closest_point: self.closest_point.clone(),
-            union_distance: self.union_distance.clone(),
-            is_closed: self.is_closed.clone(),
-            ..Surface::new(positions, self.faces.clone())
-        }
-    }
-
     /// The kd-tree over the vertices.
     pub fn vertex_index(&self) -> &VertexIndex<T> {
         self.vertex_index.get_or_init(|| VertexIndex::new(&self.positions))
@@ -94,8 +83,7 @@ impl<T: Real> Surface<T> {
     /// The closest-point tree over the faces.
     pub fn closest_point(&self) -> &ClosestPoint {
         self.closest_point.get_or_init(|| {
-            let positions = self.positions.iter().map(|p| vec3::to_f64(*p)).collect();
-            Arc::new(ClosestPoint::new(positions, &self.faces))
+            ClosestPoint::new(self.positions.iter().map(|p| vec3::to_f64(*p)).collect(), &self.faces)
         })
     }
 
@@ -103,7 +91,7 @@ impl<T: Real> Surface<T> {
     pub fn union_distance(&self) -> &UnionDistance {
         self.union_distance.get_or_init(|| {
             let positions: Vec<_> = self.positions.iter().map(|p| vec3::to_f64(*p)).collect();
-            Arc::new(UnionDistance::new(&positions, &self.faces))
+            UnionDistance::new(&positions, &self.faces)
         })
     }
 
@@ -283,7 +271,6 @@ mod tests {
         let ball = shapes::icosphere(0.1, 3);
         let body = shapes::union(&[&ball, &shapes::mapped(&ball, |[x, y, z]| [x + 0.13, y, z])]);
         let surface = Surface::<f64>::from_mesh(&body);
-        let wide = Surface::<f32>::from_mesh(&body).widened();
         let (mut inside, mut beyond) = (0, 0);
         for p in SplitMix::new(21).points(2000, 0.3) {
             let exact = surface.gap(p, Distance::Union);
@@ -295,7 +282,6 @@ mod tests {
                 assert_eq!(found, exact);
                 inside += usize::from(exact.gap < -0.03);
             }
-            assert!((wide.gap(p, Distance::Union).gap - exact.gap).abs() < 1e-7);
         }
         assert!(inside > 10 && beyond > 500, "{inside} {beyond}");
     }

@@ -40,7 +40,7 @@ pub struct PreparedScene {
     pub garments: Vec<Arc<PreparedGarment>>,
     /// Pairs (inner, outer) of positions in `garments` that interact: those of [`contacts`].
     pub contacts: Vec<(usize, usize)>,
-    /// Thickness of what is worn below every vertex `[ΣV]` (m); empty where nothing is, or the networks do not ask.
+    /// Thickness of the garments below every vertex `[ΣV]` (m); empty where there is none, or the networks do not ask.
     pub thickness_below: Vec<f32>,
     /// Bodies.
     pub bodies: Vec<PreparedBody>,
@@ -134,12 +134,12 @@ pub struct Arrangement {
     unseen: Vec<Vec<f32>>,
     /// Pairs (inner, outer) that interact.
     pub contacts: Vec<(usize, usize)>,
-    /// Thickness of what is worn below every vertex `[ΣV]` (m); empty where nothing is, or the networks do not ask.
+    /// Thickness of the garments below every vertex `[ΣV]` (m); empty where there is none, or the networks do not ask.
     pub thickness_below: Vec<f32>,
 }
 
 impl SceneBuilder<'_> {
-    /// Arranges `garments` worn over those `below`.
+    /// Arranges `garments` that lie over those `below`.
     pub fn arrange(
         &self,
         garments: Vec<Arc<PreparedGarment>>,

@@ -53,7 +53,7 @@ impl PreparedGarment {
         self.footprint.get_or_init(|| Footprint::new(&self.garment, body))
     }
 
-    /// Thickness (m) of what is worn below each vertex `[V]`, where every garment of `below` is at least `each` thick (m).
+    /// Thickness (m) of the garments `below` at each vertex `[V]`, each of which counts as at least `each` thick (m).
     pub fn thickness_of(&self, below: &[&Arc<Self>], body: &Body, each: f64) -> Vec<f32> {
         let thickness = |garment: &Self| each.max(garment.energies.material().thickness);
         let below = below.iter().map(|garment| (garment.footprint(body), thickness(garment)));

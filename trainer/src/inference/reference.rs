@@ -11,6 +11,7 @@ use clothcombo_physics::energy::{
     EnergyError, EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers,
 };
 use clothcombo_physics::mesh::Topology;
+use clothcombo_physics::query::Surface;
 use clothcombo_physics::transform::apply;
 use std::sync::Arc;
 
@@ -49,7 +50,8 @@ impl ReferenceScene {
         let layers = body.energy.layers.iter();
         let layers =
             layers.map(|l| SceneLayers { inner: l.inner, outer: l.outer, weights: l.weights }).collect();
-        let body = Arc::new(body.energy.body.widened());
+        let surface = &body.energy.body;
+        let body = Arc::new(Surface::new(wide(&surface.positions), surface.faces.clone()));
         Ok(Self {
             energy: SceneEnergy { body, garments, layers, settings }.continuous().pulled_back(&transforms),
             skinned_start: transforms.iter().zip(&start).map(|(t, p)| apply(t, *p)).collect(),

@@ -139,7 +139,7 @@ impl Placement<'_> {
         Ok(GivenGarment { garment, given, path: None, fit: Some(fitted.report), follows })
     }
 
-    /// Whether a mesh is one garment that is worn where it lies.
+    /// Whether a mesh is one garment that fits where it lies.
     fn is_on_body(&self, mesh: &TriMesh) -> bool {
         let check = self.check.get_or_init(|| PlacementCheck::new(self.body));
         check

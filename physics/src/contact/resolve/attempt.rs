@@ -16,7 +16,7 @@ use crate::query::Surface;
 /// How what is left is tried once more: gap and rings, as multiples of those asked for. A smaller gap is for many sheets in one
 /// crease, a larger one goes round what holds a few of them.
 const AGAIN: [(f64, usize); 3] = [(1.0, 1), (0.3, 1), (3.0, 2)];
-/// Most pairs that may be left for that: more would only be torn further.
+/// Most pairs that may be left for that: more would only be stretched further.
 pub(super) const FEW: usize = 32;
 /// Pairs of garments with themselves that may be left where nothing else crosses.
 pub(super) const FEW_OF_ITSELF: usize = 8;

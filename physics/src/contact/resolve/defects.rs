@@ -1,4 +1,4 @@
-//! Which of two states of an outfit is the better one: the only rule for it.
+//! Which of two states of an outfit is the better one.
 
 /// What is wrong with a state. Less is better, compared in the order of the fields.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]

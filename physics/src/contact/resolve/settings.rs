@@ -31,8 +31,7 @@ pub struct ResolveSettings {
     pub stretch: f64,
     /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken if it ends
     /// with none. Where few are left in the end, all is tried again from there and both limits are measured anew. Default 6; 1
-    /// for strict limits: no attempt begins where another one ended, and added strain is not
-    /// relaxed.
+    /// for strict limits: no attempt begins where another one ended, and added strain is not relaxed.
     pub loosened: f64,
     /// Most steps on a path: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
     /// Default 128; 0 mends the drape as it is or not at all.
@@ -46,7 +45,7 @@ pub struct ResolveSettings {
     pub self_contact: bool,
     /// Most rounds of detection and relaxation of an outfit, over all attempts and all steps of a path together; a quarter of
     /// them on a body of which more than 1,000 pairs of triangles intersect each other. Where they are used up, the best state
-    /// so far is taken. Default 1,200: half a minute to a minute for 4,000 vertices on one core.
+    /// so far is taken. Default 1,200: about half a minute for 4,000 vertices on one core.
     pub total_rounds: usize,
     /// Wall time, times the number of garments, with the same effect, which makes the result depend on the machine. Default
     /// none.

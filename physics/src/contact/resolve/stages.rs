@@ -2,7 +2,8 @@
 //!
 //! A step that is halved comes by the same places again.
 //!
-//! The drape at the end may be more than what is known of the stages: a solver may have refined it. What it differs by from the stage at 1 is faded in along the path, in the frames of the skinning transforms.
+//! The drape at the end may be more than what is known of the stages: a solver may have refined it. What it differs by from the
+//! stage at 1 is faded in along the path, in the frames of the skinning transforms.
 
 use super::{Layer, PathSample};
 use crate::transform::{into_frame, out_of_frame};

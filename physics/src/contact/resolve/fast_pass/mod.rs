@@ -87,11 +87,11 @@ pub(super) fn passed_near(
     let rounds = pass.run(budget);
     let most_self_intersections = match mends_self_intersections(settings) {
         true => FEW_OF_ITSELF,
-        false => pass.folds.len(),
+        false => pass.known_self_intersections.len(),
     };
     if pass.between() > 0
         || pass.parted_self_intersections().count() > most_self_intersections
-        || pass.own().count() > pass.folds.len()
+        || pass.own().count() > pass.known_self_intersections.len()
     {
         return None;
     }
@@ -106,7 +106,7 @@ pub(super) fn passed_near(
     is_good(&resolved.certificate, most_self_intersections).then_some(resolved)
 }
 
-/// Whether folds of the input are mended, not only those that were made: strict limits leave them.
+/// Whether self-intersections of the input are mended, not only those that were made: strict limits leave them.
 fn mends_self_intersections(settings: &ResolveSettings) -> bool {
     settings.self_contact && settings.loosened > 1.0
 }
@@ -137,7 +137,7 @@ struct FastPass<'a> {
     /// Directions away from the body.
     outward: Vec<[f64; 3]>,
     /// Pairs of the input's garments with themselves, ascending.
-    folds: FacePairs,
+    known_self_intersections: FacePairs,
     /// Conditions that parted triangles so far: without them their neighbours would pull them in again.
     remembered: Vec<Contact>,
 }
@@ -152,7 +152,7 @@ impl<'a> FastPass<'a> {
         let input: Vec<[f64; 3]> = outfit.layers.iter().flat_map(|l| l.positions).copied().collect();
         let positions = [input.as_slice(), &body.surface.positions].concat();
         let filter = StepFilter::new(mesh, &positions);
-        let (shape, folds) = (input.clone(), Vec::new());
+        let (shape, known_self_intersections) = (input.clone(), Vec::new());
         let (outward, remembered) = (Vec::new(), Vec::new());
         let look = |p: &[f64; 3]| body.look(*p)?.plane;
         let planes = input.par_iter().with_min_len(128).map(look).collect();
@@ -166,10 +166,10 @@ impl<'a> FastPass<'a> {
             positions,
             planes,
             outward,
-            folds,
+            known_self_intersections,
             remembered,
         };
-        pass.folds = pass.own().copied().collect();
+        pass.known_self_intersections = pass.own().copied().collect();
         pass
     }
 
@@ -204,8 +204,9 @@ impl<'a> FastPass<'a> {
         let mut to = self.positions.clone();
         let cloth = &mut to[..self.input.len()];
         let region = &defects.region;
-        let folds: Vec<(u32, u32)> = self.parted_self_intersections().copied().collect();
-        let (pairs, shape) = ((folds.as_slice(), self.folds.as_slice()), self.shape.as_mut_slice());
+        let parted: Vec<(u32, u32)> = self.parted_self_intersections().copied().collect();
+        let (pairs, shape) =
+            ((parted.as_slice(), self.known_self_intersections.as_slice()), self.shape.as_mut_slice());
         let gap = SELF_GAP * self.settings.gap;
         contacts.extend(part_self_intersections(self.outfit, pairs, gap, &self.positions, (cloth, shape)).0);
         let (stretch, most) = (self.settings.stretch, self.settings.farthest);
@@ -263,7 +264,7 @@ impl<'a> FastPass<'a> {
 
     /// Pairs of garments with themselves that are to be parted.
     fn parted_self_intersections(&self) -> impl Iterator<Item = &(u32, u32)> {
-        let is_known = |pair| self.folds.binary_search(pair).is_ok();
+        let is_known = |pair| self.known_self_intersections.binary_search(pair).is_ok();
         let is_asked = move |pair| mends_self_intersections(self.settings) || !is_known(pair);
         self.own().filter(move |pair| is_asked(pair) && !(self.is_pinch(pair.0) && self.is_pinch(pair.1)))
     }
