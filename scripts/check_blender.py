@@ -10,6 +10,10 @@ import pathlib
 import runpy
 import sys
 
+if len(sys.argv) != 2 or sys.argv[1] in ("-h", "--help"):
+    print(__doc__)
+    sys.exit(0 if len(sys.argv) == 2 else 2)
+
 import bpy
 import numpy as np
 
@@ -41,8 +45,6 @@ def check(what, name, distance):
 
 
 def main():
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
     folder = pathlib.Path(sys.argv[1])
     caches = {path.stem: point_cache(path) for path in sorted(folder.glob("*.pc2"))}
     assert caches, f"{folder} holds no point cache; drape a motion"

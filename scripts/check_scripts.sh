@@ -53,6 +53,7 @@ check bench_energies.sh scripts/bench_energies.sh --no-torch --sizes 500 --round
 check bench_operators.py bench_operators
 check bench_vs_torch.sh scripts/bench_vs_torch.sh --read --widths 16 --layers 2 --vertices 200
 check check_backends.sh scripts/check_backends.sh -h
+check check_blender.py "$PYTHON" scripts/check_blender.py --help
 check check_python.sh scripts/check_python.sh -h
 check figures.py "$PYTHON" scripts/figures.py --help
 check gpu_check.sh gpu_check

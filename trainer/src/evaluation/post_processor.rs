@@ -60,7 +60,7 @@ impl<'a> PostProcessor<'a> {
 
     /// `scene` in a pose between the T-pose and its own, draped by the forward pass alone: that leaves fewer intersections
     /// than the accepted state (docs/resolve.md).
-    fn stage(&self, scene: &PreparedScene, share: f64) -> Result<PathSample, PostProcessError> {
+    fn path_sample(&self, scene: &PreparedScene, share: f64) -> Result<PathSample, PostProcessError> {
         let mut sample = scene.sample.clone();
         for body in &mut sample.bodies {
             body.pose = body.pose.scaled_keeping_heading(share);
@@ -103,8 +103,8 @@ impl DrapedScene<'_> {
     /// # Errors
     /// When it is no valid scene, or another pose cannot be draped.
     pub fn resolved(&self, settings: &ResolveSettings) -> Result<Resolved, PostProcessError> {
-        let stage_at = |share: f64| self.post_processor.stage(self.scene, share);
-        resolve_along(&self.body, &self.layers(), settings, stage_at)
+        let sample_at = |share: f64| self.post_processor.path_sample(self.scene, share);
+        resolve_along(&self.body, &self.layers(), settings, sample_at)
     }
 
     /// Whether the order of the garments is feasible ([`infeasible_pair`]).

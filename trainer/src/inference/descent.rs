@@ -318,7 +318,7 @@ mod tests {
 
     #[test]
     fn garments_do_not_both_strain_for_what_the_outfit_loses() {
-        // Two tubes that cross would part by stretching: each wins the pair, which counts for both, and pays its own strain.
+        // Two tubes that intersect would part by stretching: each wins the pair, which counts for both, and pays its own strain.
         let (mut energy, rest) = scene(&[0.12, 0.12], &[[0, 1]]);
         let (apart, start) = (stretched(&rest, &[0.96, 1.04]), stretched(&rest, &[1.0, 1.0]));
         let raw = Descent::new(&energy, start.clone());

@@ -1,8 +1,8 @@
-//! An outfit on one body: what a draper made, stage by stage.
+//! An outfit on one body: what a draper made, sample by sample.
 
 use super::{Draper, DraperError, Outfit, PhaseTimes, Refinement};
 use clothcombo_physics::Surface;
-use clothcombo_physics::contact::resolve::{Certificate, Reached, certify};
+use clothcombo_physics::contact::resolve::{Certificate, ContactState, certify};
 use clothcombo_physics::transform::Transform;
 use std::sync::Arc;
 
@@ -50,13 +50,13 @@ impl Drape {
     }
 
     /// Where the next frame starts.
-    pub(super) fn reached(&self) -> Reached {
+    pub(super) fn contact_state(&self) -> ContactState {
         let garments = || self.garments.iter();
-        Reached {
+        ContactState {
             draped: garments().map(|g| g.network.clone()).collect(),
             positions: garments().map(|g| g.positions.clone()).collect(),
             transforms: garments().flat_map(|g| g.transforms.iter().copied()).collect(),
-            crossings: self.certificate.crossings(),
+            intersections: self.certificate.intersections(),
         }
     }
 

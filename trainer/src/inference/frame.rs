@@ -115,11 +115,17 @@ impl Draper {
                     1.0 => Ok(made.sample(outfit)),
                     _ => {
                         let place = add_scaled(state.place, share, sub(body.place, state.place));
-                        self.stage(Pass::Accepted, outfit, body, state.pose.between(&body.pose, share), place)
+                        self.path_sample(
+                            Pass::Accepted,
+                            outfit,
+                            body,
+                            state.pose.between(&body.pose, share),
+                            place,
+                        )
                     }
                 }
             };
-            carried = resolve_after(drape.reached(), surface, &layers, settings, between)?;
+            carried = resolve_after(drape.contact_state(), surface, &layers, settings, between)?;
             if let Some(done) = carried.take_if(|done| retry.is_met(&done.certificate)) {
                 return Ok(done);
             }
@@ -127,11 +133,11 @@ impl Draper {
         let from_t_pose = |share: f64| {
             watch(share);
             let pose = body.pose.scaled_keeping_heading(share);
-            let stage = self.stage(Pass::ForwardPass, outfit, body, pose, body.place)?;
+            let sample = self.path_sample(Pass::ForwardPass, outfit, body, pose, body.place)?;
             Ok::<_, DraperError>(match share {
                 // The surface is known here only.
-                1.0 => PathSample { draped: stage.draped, ..made.sample(outfit) },
-                _ => stage,
+                1.0 => PathSample { draped: sample.draped, ..made.sample(outfit) },
+                _ => sample,
             })
         };
         let anew = resolve_along(surface, &layers, settings, from_t_pose)?;

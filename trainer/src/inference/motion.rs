@@ -11,21 +11,21 @@ const FRAMES_WITHOUT_RETRY: usize = 15;
 /// Flaws that carrying on from another frame may leave.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RetryPolicy {
-    crossings: usize,
+    intersections: usize,
     excess_strain: usize,
 }
 
 impl RetryPolicy {
-    const NONE: Self = Self { crossings: 0, excess_strain: 0 };
-    const ALL: Self = Self { crossings: usize::MAX, excess_strain: usize::MAX };
+    const NONE: Self = Self { intersections: 0, excess_strain: 0 };
+    const ALL: Self = Self { intersections: usize::MAX, excess_strain: usize::MAX };
 
     /// After a frame of which starting anew left these: excess strain must not grow from frame to frame.
     fn after(anew: &Certificate) -> Self {
-        Self { crossings: usize::MAX, excess_strain: anew.excess_strain().saturating_add(1) }
+        Self { intersections: usize::MAX, excess_strain: anew.excess_strain().saturating_add(1) }
     }
 
     pub fn is_met(self, certificate: &Certificate) -> bool {
-        certificate.crossings() <= self.crossings && certificate.excess_strain() <= self.excess_strain
+        certificate.intersections() <= self.intersections && certificate.excess_strain() <= self.excess_strain
     }
 }
 
@@ -33,7 +33,7 @@ impl RetryPolicy {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DrapeProgress {
     /// The post-process looks at a pose at this share of the continuation path to the frame: from the one before it,
-    /// or, where that leaves crossings, from the T-pose.
+    /// or, where that leaves intersections, from the T-pose.
     Continuation(f64),
     /// One more frame is draped.
     Draped,
@@ -44,7 +44,7 @@ pub enum DrapeProgress {
 impl Draper {
     /// Drapes `outfit` on each of `bodies`, the frames of a motion. What the networks make is averaged over `radius`
     /// frames to each side before the post-process; 0 takes each frame as it is. The post-process carries on from frame
-    /// to frame; where a frame is left with crossings or torn cloth, and the one after it with less and no crossings,
+    /// to frame; where a frame is left with intersections or torn cloth, and the one after it with less and no intersections,
     /// it carries on backwards from that one as well. `progress` is called on the path to each frame, after it, and
     /// before each that is draped once more.
     ///
@@ -110,7 +110,7 @@ impl Draper {
 }
 
 /// From the last frame to the first: `again` improves what has flaws, from the frame after it, where that has fewer and no
-/// crossings.
+/// intersections.
 fn carry_back<T, E>(
     frames: &mut [T],
     certificate: impl Fn(&T) -> &Certificate,
@@ -120,7 +120,7 @@ fn carry_back<T, E>(
         let (own, after) = frames.split_at_mut(frame + 1);
         let (own, after) = (&mut own[frame], &after[0]);
         let (now, next) = (certificate(own), certificate(after));
-        if !RetryPolicy::NONE.is_met(now) && next.defects() < now.defects() && next.crossings() == 0 {
+        if !RetryPolicy::NONE.is_met(now) && next.defects() < now.defects() && next.intersections() == 0 {
             again(frame, own, after)?;
         }
     }
@@ -131,13 +131,17 @@ fn carry_back<T, E>(
 mod tests {
     use super::*;
 
-    fn left(crossings: usize, strain: f64) -> Certificate {
-        Certificate { body_triangle_pairs: crossings, strain_added: Some(strain), ..Certificate::default() }
+    fn left(intersections: usize, strain: f64) -> Certificate {
+        Certificate {
+            body_triangle_pairs: intersections,
+            strain_added: Some(strain),
+            ..Certificate::default()
+        }
     }
 
     #[test]
     fn after_a_frame_with_flaws_crossings_are_allowed_but_no_growing_strain() {
-        for (certificate, at_first, after_crossings, after_strain) in [
+        for (certificate, at_first, after_intersections, after_strain) in [
             (left(0, 0.4), true, true, true),
             (left(0, -0.4), true, true, true),
             (left(3, 0.0), false, true, true),
@@ -148,7 +152,7 @@ mod tests {
             assert_eq!(RetryPolicy::NONE.is_met(&certificate), at_first, "{certificate:?}");
             assert_eq!(
                 RetryPolicy::after(&left(7, 0.0)).is_met(&certificate),
-                after_crossings,
+                after_intersections,
                 "{certificate:?}"
             );
             assert_eq!(
@@ -163,23 +167,23 @@ mod tests {
 
     #[test]
     fn frames_with_flaws_are_improved_from_clear_ones_after_them() {
-        let crossings =
-            |frames: &[Certificate]| frames.iter().map(Certificate::crossings).collect::<Vec<_>>();
-        let mut frames = [5, 4, 3, 0, 2, 0, 7].map(|crossings| left(crossings, 0.0));
+        let intersections =
+            |frames: &[Certificate]| frames.iter().map(Certificate::intersections).collect::<Vec<_>>();
+        let mut frames = [5, 4, 3, 0, 2, 0, 7].map(|intersections| left(intersections, 0.0));
         let mut asked = Vec::new();
         let found: Result<(), String> = carry_back(
             &mut frames,
             |frame| frame,
             |frame, own, after| {
-                assert_eq!(after.crossings(), 0);
-                asked.push((frame, own.crossings()));
+                assert_eq!(after.intersections(), 0);
+                asked.push((frame, own.intersections()));
                 *own = left(usize::from(frame == 1), 0.0);
                 Ok(())
             },
         );
         assert!(found.is_ok());
         assert_eq!(asked, [(4, 2), (2, 3), (1, 4)]);
-        assert_eq!(crossings(&frames), [5, 1, 0, 0, 0, 0, 7]);
+        assert_eq!(intersections(&frames), [5, 1, 0, 0, 0, 0, 7]);
         // So is excess strain, from a frame that has less of it.
         let mut torn = [left(0, 2.0), left(0, 1.5), left(2, 0.0), left(0, 0.5)];
         let mut asked = Vec::new();

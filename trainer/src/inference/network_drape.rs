@@ -114,7 +114,7 @@ impl Draper {
     }
 
     /// The same in `pose` and place, a sample of the continuation path to `body`, for the post-process.
-    pub(super) fn stage(
+    pub(super) fn path_sample(
         &self,
         pass: Pass,
         outfit: &Outfit,

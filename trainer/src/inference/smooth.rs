@@ -1,7 +1,7 @@
 //! Temporal smoothing of a motion that never makes an intersection nor tears cloth.
 //!
 //! What is smoothed is each vertex's offset from linear blend skinning in the frame of its own skinning transform, so that
-//! cloth that merely follows the body stays as it is. Every smoothed frame is counted exactly; where it crosses more than the
+//! cloth that merely follows the body stays as it is. Every smoothed frame is counted exactly; where it intersects more than the
 //! frame as it was, or is torn more, less of the smoothing is applied, and none if need be.
 
 use super::{Drape, Draper, DraperError, Outfit};

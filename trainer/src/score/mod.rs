@@ -93,7 +93,7 @@ pub struct GarmentScore {
     pub raw: TermValues,
     /// The same times the paper's weights, whatever the number of vertices.
     pub weighted: TermValues,
-    /// How it crosses the body and itself.
+    /// How it intersects the body and itself.
     pub penetration: PenetrationScore,
 }
 

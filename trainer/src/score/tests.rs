@@ -30,7 +30,7 @@ fn weights_are_the_papers() {
 }
 
 #[test]
-fn a_garment_at_rest_over_its_body_has_no_strain_and_crosses_nothing() {
+fn a_garment_at_rest_over_its_body_has_no_strain_and_intersects_nothing() {
     let (body, inner, outer) = scene();
     let garments = [draped("inner", &inner), draped("outer", &outer)];
     let right = score(&body, &garments, ScoreDistance::Surface).unwrap();
@@ -110,7 +110,7 @@ fn holding_is_measured_where_canonical_positions_are_given_and_strain_is_the_pri
 }
 
 #[test]
-fn a_lifted_body_crosses_the_sleeve_and_is_measured_in_millimetres() {
+fn a_lifted_body_intersects_the_sleeve_and_is_measured_in_millimetres() {
     let (body, inner, _) = scene();
     let moved = mapped(&body, |[x, y, z]| [x + 0.02, y, z]);
     for distance in [ScoreDistance::NearestVertex, ScoreDistance::Surface] {

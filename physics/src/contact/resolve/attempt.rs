@@ -1,4 +1,4 @@
-//! Attempts: the first one, those on a body that gives way, and those that begin where another one ended.
+//! Attempts: the first one, those on a body that yields, and those that start from the result of another one.
 
 use std::time::Instant;
 
@@ -13,17 +13,16 @@ use super::withdrawal::ClearanceWithdrawal;
 use super::{Layer, ResolveError, ResolveSettings, Resolved, passed_near, strain_relaxation};
 use crate::query::Surface;
 
-/// How what is left is tried once more: gap and rings, as multiples of those asked for. A smaller gap is for many sheets in one
-/// crease, a larger one goes round what holds a few of them.
+/// Continued attempts: gap and rings as multiples of the settings. A smaller gap is for many sheets in one crease, a larger one
+/// goes round what holds a few of them.
 const AGAIN: [(f64, usize); 3] = [(1.0, 1), (0.3, 1), (3.0, 2)];
-/// Most pairs that may be left for that: more would only be stretched further.
+/// Most pairs that may be left for them: more would only be stretched further.
 pub(super) const FEW: usize = 32;
-/// Pairs of garments with themselves that may be left where nothing else crosses.
+/// Self-intersecting pairs that may be left where nothing else intersects.
 pub(super) const FEW_OF_ITSELF: usize = 8;
 
-/// The fast pass and, of what it does not clear, the first attempts. Where something is left to do then, `further` may go on from
-/// there: it gets the body and what was reached. The body only gives way before that where at most so many pairs (`most`) are
-/// left.
+/// The fast pass and, if it does not clear the outfit, the first attempts. If those do not either, `further` goes on from the
+/// body and the result so far. Before that the body yields only if at most `most` pairs are left.
 pub(super) fn resolved_further<E: From<ResolveError>>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
@@ -87,20 +86,20 @@ fn resolved_once(
     })
 }
 
-/// [`super::resolve`] on a body that does not give way: enough for most garments.
+/// [`super::resolve`] on a body that does not yield: enough for most garments.
 fn simply_resolved(
     drawn: &BodyObstacle<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
     budget: &Budget,
 ) -> Resolved {
-    // Wider limits are for what is left when the body has given way.
+    // Wider limits are for what is left when the body has yielded.
     let settings = ResolveSettings { loosened: 1.0, ..*settings };
     judged(drawn, layers, untangled(drawn, layers, &settings, budget), budget)
 }
 
 impl Resolved {
-    /// [`super::resolve`] on a `body` that gives way, which is taken where it is better. Nothing where the `budget` is spent.
+    /// [`super::resolve`] on a `body` that yields, taken if it is better. Nothing if the `budget` is spent.
     fn yield_to_cloth(
         &mut self,
         body: &Body<'_>,
@@ -115,9 +114,9 @@ impl Resolved {
         }
     }
 
-    /// Where few crossings are left on `body`, or none but those of garments with themselves, attempts that begin where
-    /// the one before ended: cloth that is nearly sorted out is the better shape to return to and to measure lengths
-    /// from than the drape it came from. None where limits are strict (`settings.loosened`).
+    /// If few intersections are left on `body`, or only self-intersections, attempts that start from the result of the one
+    /// before: nearly untangled cloth is a better reference for shape and lengths than the drape. None if limits are strict
+    /// (`settings.loosened`).
     pub(super) fn go_on(
         &mut self,
         body: &Surface<f64>,
@@ -133,7 +132,7 @@ impl Resolved {
             if left == 0 && is_smooth || left > FEW || budget.is_spent() {
                 break;
             }
-            // Self-intersections become fewer from attempt to attempt as they are.
+            // Self-intersections become fewer without other gaps or rings.
             let (gap, rings) = if left > 0 { *again } else { (1.0, 1) };
             let settings =
                 ResolveSettings { gap: gap * settings.gap, rings: rings * settings.rings, ..*settings };
@@ -147,7 +146,7 @@ impl Resolved {
     }
 }
 
-/// What untangling left, brought back to the body as it is drawn where it can be, with its certificate.
+/// The result of untangling, out of the body's clearance where that works, with its certificate.
 pub(super) fn settled(
     body: &Body<'_>,
     layers: &[Layer<'_>],
@@ -161,7 +160,7 @@ pub(super) fn settled(
     resolved
 }
 
-/// What untangling left, with its certificate.
+/// The result of untangling, with its certificate.
 pub(super) fn judged(
     drawn: &BodyObstacle<'_>,
     layers: &[Layer<'_>],

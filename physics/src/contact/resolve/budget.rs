@@ -1,4 +1,4 @@
-//! What the post-process of one outfit may spend, over all its stages together.
+//! The rounds and time that the post-process of one outfit may spend.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};

@@ -1,4 +1,4 @@
-//! What is left, counted exactly.
+//! The certificate: what intersects, counted exactly.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,7 @@ pub struct Certificate {
     pub layer_triangle_pairs: usize,
     /// Pairs of triangles of one garment that share more than their common vertices.
     pub self_triangle_pairs: usize,
-    /// Length of the curves in which all those pairs cross (mm).
+    /// Length of the curves in which all those pairs intersect (mm).
     pub contour_length_mm: f64,
     /// Depth of the deepest vertex under the body's surface or under an inner garment (mm); 0 when there is none.
     pub max_depth_mm: f64,
@@ -95,10 +95,10 @@ pub struct LayerCertificate {
     pub order_violations: f64,
 }
 
-/// What a garment triangle crosses.
+/// What a garment triangle intersects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Crossed {
+pub enum IntersectedSurface {
     /// The body.
     Body,
     /// Another garment, by its index.
@@ -107,15 +107,15 @@ pub enum Crossed {
     Itself,
 }
 
-/// Two triangles that cross. Indices are 0-based.
+/// Two triangles that intersect. Indices are 0-based.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct RemainingPair {
     /// The garment; of two, the outer one.
     pub garment: usize,
     /// Its triangle.
     pub triangle: usize,
-    /// What it crosses.
-    pub crosses: Crossed,
+    /// What it intersects.
+    pub intersects: IntersectedSurface,
     /// The triangle there.
     pub other_triangle: usize,
     /// Whether the body lies inside itself there.
@@ -131,10 +131,11 @@ impl Certificate {
         for ((garment, of_garment), strain_joule) in report.garments.iter().enumerate().zip(strains) {
             let mut own = GarmentCertificate { strain_joule, ..GarmentCertificate::default() };
             depths.extend(&of_garment.depths);
-            own.body_triangle_pairs = found.list(garment, Crossed::Body, &of_garment.with_body);
+            own.body_triangle_pairs = found.list(garment, IntersectedSurface::Body, &of_garment.with_body);
             for layer in report.layers.iter().filter(|layer| layer.outer == garment) {
                 depths.extend(&layer.depths);
-                own.layer_triangle_pairs += found.list(garment, Crossed::Layer(layer.inner), &layer.pairs);
+                own.layer_triangle_pairs +=
+                    found.list(garment, IntersectedSurface::Layer(layer.inner), &layer.pairs);
                 found.layers.push(LayerCertificate {
                     inner: layer.inner,
                     outer: layer.outer,
@@ -142,7 +143,8 @@ impl Certificate {
                     order_violations: layer.order().share(),
                 });
             }
-            own.self_triangle_pairs = found.list(garment, Crossed::Itself, &of_garment.with_itself);
+            own.self_triangle_pairs =
+                found.list(garment, IntersectedSurface::Itself, &of_garment.with_itself);
             found.body_triangle_pairs += own.body_triangle_pairs;
             found.layer_triangle_pairs += own.layer_triangle_pairs;
             found.self_triangle_pairs += own.self_triangle_pairs;
@@ -160,13 +162,13 @@ impl Certificate {
     }
 
     /// Lists pairs of garment `garment` and returns how many are not pinched.
-    fn list(&mut self, garment: usize, crosses: Crossed, found: &TrianglePairs) -> usize {
+    fn list(&mut self, garment: usize, intersects: IntersectedSurface, found: &TrianglePairs) -> usize {
         self.contour_length_mm += 1e3 * found.contour_length;
         for (pairs, is_pinched) in [(&found.pairs, false), (&found.pinched, true)] {
             self.remaining.extend(pairs.iter().map(|&(f, g)| RemainingPair {
                 garment,
                 triangle: f as usize,
-                crosses,
+                intersects,
                 other_triangle: g as usize,
                 is_pinched,
             }));
@@ -224,12 +226,12 @@ impl Certificate {
         self.body_triangle_pairs + self.layer_triangle_pairs
     }
 
-    /// Those of them that are not narrow either: what more work might mend.
-    pub fn crossings(&self) -> usize {
+    /// Those of them that are not narrow either: more work might mend them.
+    pub fn intersections(&self) -> usize {
         self.between().saturating_sub(self.narrow_triangle_pairs)
     }
 
-    /// Whether no garment crosses the body or another garment, pinched regions left out.
+    /// Whether no garment intersects the body or another garment, pinched regions left out.
     pub fn is_clear(&self) -> bool {
         self.between() == 0
     }
@@ -243,7 +245,7 @@ impl Certificate {
     /// What is wrong.
     pub fn defects(&self) -> Defects {
         Defects {
-            intersections: self.crossings(),
+            intersections: self.intersections(),
             narrow: self.narrow_triangle_pairs,
             excess_strain: self.excess_strain(),
             self_intersections: self.self_triangle_pairs,
@@ -255,10 +257,12 @@ impl Certificate {
         self.garments.iter().map(|g| g.strain_joule).sum()
     }
 
-    /// Counts the pairs with the body where it gives way.
+    /// Counts the pairs with the body where it yields.
     pub(super) fn count_narrow(&mut self, body: &BodyObstacle<'_>) {
         let is_narrow = |pair: &&RemainingPair| {
-            pair.crosses == Crossed::Body && !pair.is_pinched && body.gave_way(pair.other_triangle as u32)
+            pair.intersects == IntersectedSurface::Body
+                && !pair.is_pinched
+                && body.yielded(pair.other_triangle as u32)
         };
         self.narrow_triangle_pairs = self.remaining.iter().filter(is_narrow).count();
     }

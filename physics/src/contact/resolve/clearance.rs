@@ -1,10 +1,9 @@
 //! Clearance for cloth where a posed body presses into itself.
 //!
 //! Skinned bodies do not know contact: the upper arm of a hanging arm lies inside the chest, the thigh of a crouching body
-//! inside the belly. No cloth can be outside of both, and where two parts merely touch there is none for it either. Real flesh
-//! gives way. So does this body, in what the garments have to stay out of: both surfaces step back by half of what is missing
-//! for some clearance between them. Cloth then lies between the two parts, under the skin that is drawn. A certificate knows
-//! nothing of this: it counts against the body as it is drawn.
+//! inside the belly. No cloth can be outside of both, and where two parts merely touch there is no room for it either. Real soft
+//! tissue yields. So does this body as an obstacle: both surfaces step back by half of the clearance that is missing between
+//! them. Cloth then lies between the two parts, under the given surface. A certificate counts against the body as given.
 
 use rayon::prelude::*;
 
@@ -14,33 +13,33 @@ use crate::contact::{Triangle, TriangleTree};
 use crate::query::{FaceSide, Surface};
 use crate::vec3::{add_scaled, dot};
 
-/// Distance that two parts of the body that look at each other keep (m), for what straight triangles need to go round a limb…
+/// Distance that two facing parts of the body keep (m), for straight triangles around a limb…
 const CLEARANCE: f64 = 0.006;
 /// …and for the two sheets of each garment (m).
 const CLEARANCE_PER_GARMENT: f64 = 0.002;
-/// Two surfaces look at each other where their normals have a cosine below this.
+/// Two surfaces face each other where their normals have a cosine below this.
 const FACING: f64 = -0.3;
 /// Farthest that the surface of another part is looked for (m).
 const DEEPEST: f64 = 0.08;
-/// Farthest that a vertex gives way (m).
+/// Largest yield of a vertex (m).
 const LONGEST_STEP: f64 = 0.04;
-/// Rings of neighbours that give way along, each half as far.
+/// Rings of neighbours that yield along, each half as far.
 const RINGS: usize = 2;
 /// How far outside the surface a vertex is asked whether it is inside another part (m).
 const LOOK_OUT: f64 = 1e-6;
 
-/// Where a body gives way: where it lies inside itself, and wherever else two parts are too near to each other for cloth.
+/// Where a body yields: where it lies inside itself, and where two parts are too near to each other for cloth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Clearance {
     /// By which share where it does not lie inside itself, 0–1.
     pub share: f64,
-    /// Whether it also does where it lies so deep inside itself, or at such a slant, that no surface looks back. Cloth that comes
-    /// into a crease step by step needs that; where it is there already, it would only be drawn deeper.
+    /// Whether it also yields where it lies so deep inside itself, or at such a slant, that no surface faces it. Cloth that enters a
+    /// crease step by step needs that; cloth that is there already would only be drawn deeper.
     pub is_deep: bool,
 }
 
 impl Clearance {
-    /// Wherever two surfaces look at each other.
+    /// Wherever two surfaces face each other.
     pub const AMPLE: Self = Self { share: 1.0, is_deep: false };
     /// Everywhere.
     pub const DEEP: Self = Self { share: 1.0, is_deep: true };
@@ -51,30 +50,30 @@ impl Clearance {
     }
 }
 
-/// How a body gave way a step before.
+/// The body's yield a step before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Before<'a> {
-    /// By how much, per vertex (m).
+    /// Per vertex (m).
     pub steps: &'a [f64],
-    /// By how much that may change (m): what looks back at a vertex may be another surface all of a sudden.
+    /// How much it may change (m): another surface may face a vertex all of a sudden.
     pub most: f64,
 }
 
-/// A body that has given way.
+/// A body that has yielded.
 pub(super) struct YieldedBody {
     /// The surface after it.
     pub surface: Surface<f64>,
-    /// Vertices that gave way.
-    pub gave_way: Vec<bool>,
-    /// By how much (m), with all the clearance there is.
+    /// Vertices that yielded.
+    pub yielded: Vec<bool>,
+    /// Yield per vertex (m) at full clearance.
     pub steps: Vec<f64>,
-    /// Corners of faces that were inside another part, or crossed one, before.
+    /// Corners of faces that were inside another part, or intersected one, before.
     pub pinched: Vec<bool>,
 }
 
 impl YieldedBody {
-    /// Of the body as it is `drawn`, near `garments` garments. `None` where nothing has to give way, or the surface is not
-    /// closed and has no inside.
+    /// Of the given body `drawn`, near `garments` garments. `None` if nothing has to yield, or the surface is not closed and has
+    /// no inside.
     pub fn of(
         drawn: &BodyObstacle<'_>,
         garments: usize,
@@ -95,27 +94,27 @@ impl YieldedBody {
         }
         let moved = body.positions.iter().zip(&body.normals).zip(&scaled);
         let positions = moved.map(|((p, n), step)| add_scaled(*p, -step, *n)).collect();
-        let gave_way: Vec<bool> = scaled.iter().map(|s| *s > 0.0).collect();
-        Some(Self { surface: Surface::new(positions, body.faces.clone()), gave_way, steps, pinched })
+        let yielded: Vec<bool> = scaled.iter().map(|s| *s > 0.0).collect();
+        Some(Self { surface: Surface::new(positions, body.faces.clone()), yielded, steps, pinched })
     }
 }
 
 impl<'a> BodyObstacle<'a> {
-    /// The body after it gave way. Where it only meets itself because of that, it is to be respected as it was.
+    /// The body after yielding. Where it meets itself only because of that, it counts as it was.
     pub fn yielded_obstacle(yielded: &'a YieldedBody, near: &'a [bool]) -> Self {
         let mut obstacle = Self::pinched_where(&yielded.surface, near, |v| yielded.pinched[v as usize]);
-        obstacle.gives_way(yielded);
+        obstacle.yields(yielded);
         obstacle
     }
 
-    /// Notes which faces give way.
-    pub fn gives_way(&mut self, yielded: &YieldedBody) {
-        self.gave_way = touching(&self.surface.faces, &yielded.gave_way);
+    /// Notes which faces yield.
+    pub fn yields(&mut self, yielded: &YieldedBody) {
+        self.yielded = touching(&self.surface.faces, &yielded.yielded);
     }
 }
 
 /// How far every vertex steps back, against its normal (m); only those `near` cloth and around them do. Also the corners of
-/// faces inside another part, or crossing one. `None` without an inside.
+/// faces inside another part, or intersecting one. `None` without an inside.
 fn steps(drawn: &BodyObstacle<'_>, clearance: f64, is_deep: bool) -> Option<(Vec<f64>, Vec<bool>)> {
     let BodyObstacle { surface, near, tree, .. } = drawn;
     let (positions, faces, union) = (&surface.positions, &surface.faces, drawn.union.as_ref()?);
@@ -152,7 +151,7 @@ fn steps(drawn: &BodyObstacle<'_>, clearance: f64, is_deep: bool) -> Option<(Vec
     Some((steps, some_inside))
 }
 
-/// How far along `n` from vertex `v` at `p` a surface looks back at it, at most `reach` (backwards where that is negative).
+/// How far along `n` from vertex `v` at `p` a surface faces it, at most `reach` (backwards where that is negative).
 fn facing_surface(
     tree: &TriangleTree<'_>,
     faces: &[[u32; 3]],
@@ -164,7 +163,7 @@ fn facing_surface(
     let end = add_scaled(p, reach, n);
     let low = std::array::from_fn(|k| p[k].min(end[k]));
     let high = std::array::from_fn(|k| p[k].max(end[k]));
-    let looks_back = |f: u32| {
+    let faces_it = |f: u32| {
         if faces[f as usize].contains(&v) {
             return None;
         }
@@ -173,11 +172,11 @@ fn facing_surface(
         let is_in_reach = along * reach.signum() > 0.0 && along.abs() <= reach.abs();
         (is_in_reach && dot(normal_of(&triangle), n) < FACING).then_some(along)
     };
-    tree.faces_in_box(low, high).filter_map(looks_back).min_by(|a, b| a.abs().total_cmp(&b.abs()))
+    tree.faces_in_box(low, high).filter_map(faces_it).min_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
-/// How far from vertex `v` at `p`, inside another part, the nearest surface is that does not look where it looks, `n`:
-/// for what has just gone in at a slant, and sees no surface straight behind it.
+/// How far from vertex `v` at `p`, inside another part, the nearest surface is that does not face the way of `n`: for a vertex that
+/// has just gone in at a slant, and has no surface straight behind it.
 fn nearest_facing(
     tree: &TriangleTree<'_>,
     faces: &[[u32; 3]],
@@ -220,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_that_press_into_each_other_make_room() {
+    fn overlapping_parts_get_clearance() {
         for (apart, garments) in [(0.19, 1), (0.203, 1), (0.17, 3)] {
             let (body, yielded) = yielded_obstacle(apart, garments);
             let yielded = yielded.unwrap();
@@ -229,19 +228,18 @@ mod tests {
             let space = space(&yielded.surface, apart);
             assert!((0.9 * clearance..1.3 * clearance).contains(&space), "{apart}: {space} of {clearance}");
             let moves = body.positions.iter().zip(&yielded.surface.positions).map(|(p, q)| norm(sub(*q, *p)));
-            for (moved, gave_way) in moves.zip(&yielded.gave_way) {
-                assert_eq!(moved > 0.0, *gave_way);
+            for (moved, yielded) in moves.zip(&yielded.yielded) {
+                assert_eq!(moved > 0.0, *yielded);
                 assert!(moved <= 0.5 * (0.2 - apart + clearance) * 1.05 + 1e-9);
             }
-            let share =
-                yielded.gave_way.iter().filter(|g| **g).count() as f64 / yielded.gave_way.len() as f64;
+            let share = yielded.yielded.iter().filter(|g| **g).count() as f64 / yielded.yielded.len() as f64;
             assert!(share < 0.3, "{share}");
         }
     }
 
-    /// From step to step no vertex goes farther than allowed, and with a share of the clearance it gives way by that share.
+    /// From step to step the yield of no vertex changes more than allowed; a share of the clearance is a share of the yield.
     #[test]
-    fn a_body_gives_way_by_and_by_and_by_shares() {
+    fn the_yield_is_limited_per_step_and_scales_with_the_share() {
         let body = Surface::from_mesh(&balls(0.19));
         let near = vec![true; body.positions.len()];
         let drawn = BodyObstacle::new(&body, &near);
@@ -264,10 +262,10 @@ mod tests {
         }
     }
 
-    /// Vertices that have just gone in at a slant see no surface straight behind them: the nearest one counts, so that
-    /// they do not give way all at once.
+    /// Vertices that have just gone in at a slant have no surface straight behind them: the nearest one counts, so that they do not
+    /// yield all at once.
     #[test]
-    fn what_has_just_gone_in_gives_way_a_little() {
+    fn a_vertex_that_has_just_gone_in_yields_a_little() {
         let steps = |apart: f64| {
             let body = Surface::from_mesh(&balls(apart));
             let near = vec![true; body.positions.len()];

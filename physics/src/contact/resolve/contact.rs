@@ -1,4 +1,4 @@
-//! Linear conditions on a garment's vertices, and where two triangles that cross ask for them.
+//! Linear conditions on a garment's vertices, and where two triangles that intersect ask for them.
 
 use crate::contact::Triangle;
 use crate::query::SurfacePoint;

@@ -1,4 +1,4 @@
-//! Counts what is left, from nothing: all pairs of triangles, and where every vertex lies.
+//! Counts the certificate from nothing: all pairs of triangles, and the depth of every vertex.
 
 use super::body::{with_body, with_drawn};
 use super::certificate::Certificate;

@@ -1,4 +1,4 @@
-//! Exact crossings of an outfit, kept up to date as vertices move.
+//! Exact intersections of an outfit, updated as vertices move.
 
 use std::collections::HashMap;
 
@@ -7,26 +7,26 @@ use super::outfit::Outfit;
 use crate::contact::TriangleTree;
 use crate::vec3::distance_squared;
 
-/// Pairs of triangles that cross. Faces of garments are numbered through.
-pub(super) struct Crossings {
+/// Pairs of triangles that intersect. Faces of garments are numbered through.
+pub(super) struct IntersectingPairs {
     /// (face, face of the body)
     pub body: Vec<(u32, u32)>,
     /// (face of the outer garment, face of the inner one)
     pub layers: Vec<(u32, u32)>,
     /// Two faces of one garment, ascending.
-    pub own: Vec<(u32, u32)>,
-    /// Faces whose crossings have to be looked for (again).
+    pub self_pairs: Vec<(u32, u32)>,
+    /// Faces whose intersections have to be looked for (again).
     pub is_dirty: Vec<bool>,
 }
 
-impl Crossings {
+impl IntersectingPairs {
     pub fn new(faces: usize) -> Self {
-        Self { body: Vec::new(), layers: Vec::new(), own: Vec::new(), is_dirty: vec![true; faces] }
+        Self { body: Vec::new(), layers: Vec::new(), self_pairs: Vec::new(), is_dirty: vec![true; faces] }
     }
 
     /// All pairs.
     pub fn count(&self) -> usize {
-        self.between() + self.own.len()
+        self.between() + self.self_pairs.len()
     }
 
     /// Pairs with the body and between garments.
@@ -43,7 +43,7 @@ impl Crossings {
         trees: &[TriangleTree<'_>],
         positions: &[[f64; 3]],
         far: &[f64],
-        (with_own, with_pinched): (bool, bool),
+        (with_self, with_pinched): (bool, bool),
     ) {
         let is_dirty = std::mem::take(&mut self.is_dirty);
         let dirty =
@@ -90,16 +90,16 @@ impl Crossings {
         self.layers.extend(found);
         self.layers.sort_unstable();
 
-        if with_own {
-            self.own.retain(|&(f, g)| is_clean(f) && is_clean(g));
+        if with_self {
+            self.self_pairs.retain(|&(f, g)| is_clean(f) && is_clean(g));
             for (g, faces) in moved.iter().enumerate() {
                 let first = outfit.faces_of_garment(g).start;
                 let local: Vec<u32> = faces.iter().map(|f| f - first).collect();
                 let found = trees[g].self_pairs_of_faces(&local);
                 let packed = found.into_iter().map(|(f, g)| (f + first, g + first));
-                self.own.extend(packed.filter(|&(f, g)| !(is_pinch(f) && is_pinch(g))));
+                self.self_pairs.extend(packed.filter(|&(f, g)| !(is_pinch(f) && is_pinch(g))));
             }
-            self.own.sort_unstable();
+            self.self_pairs.sort_unstable();
         }
         self.is_dirty = is_dirty;
         self.is_dirty.fill(false);
@@ -139,7 +139,7 @@ mod tests {
 
     /// Few or all of the vertices move each time: what is kept and what is found anew is what there is.
     #[test]
-    fn crossings_kept_up_to_date_are_all_crossings() {
+    fn crossings_kept_up_to_date_are_all_intersections() {
         let mut random = SplitMix::new(7);
         let ball = Surface::from_mesh(&shapes::icosphere(0.1, 2));
         let meshes = [9, 10, 11].map(|n| shapes::irregular_grid(0.1, 0.1, n, n, 0.2, n as u64));
@@ -154,7 +154,7 @@ mod tests {
         let near = vec![true; ball.positions.len()];
         let body = BodyObstacle::new(&ball, &near);
         let mut positions = places.concat();
-        let mut kept = Crossings::new(outfit.faces.len());
+        let mut kept = IntersectingPairs::new(outfit.faces.len());
         let mut counts = [0; 3];
         for round in 0..12 {
             // All, one in ten, and all of a garment but none of the others.
@@ -178,7 +178,7 @@ mod tests {
             let [with_body, between] = all_pairs(&outfit, &positions, &ball);
             assert_eq!(kept.body, with_body, "round {round}");
             assert_eq!(kept.layers, between, "round {round}");
-            let own: Vec<(u32, u32)> = trees
+            let self_pairs: Vec<(u32, u32)> = trees
                 .iter()
                 .enumerate()
                 .flat_map(|(g, tree)| {
@@ -186,8 +186,8 @@ mod tests {
                     tree.self_pairs().into_iter().map(move |(a, b)| (a + first, b + first))
                 })
                 .collect();
-            assert_eq!(kept.own, own, "round {round}");
-            let found = [with_body.len(), between.len(), own.len()];
+            assert_eq!(kept.self_pairs, self_pairs, "round {round}");
+            let found = [with_body.len(), between.len(), self_pairs.len()];
             counts = std::array::from_fn(|k| counts[k] + found[k]);
         }
         assert!(counts.iter().all(|count| *count > 100), "{counts:?}");

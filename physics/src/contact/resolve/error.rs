@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// What is wrong with the input of [`super::resolve`]. Indices are 0-based. Crossings that stay are a result, not an error.
+/// What is wrong with the input of [`super::resolve`]. Indices are 0-based. Intersections that stay are a result, not an error.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ResolveError {

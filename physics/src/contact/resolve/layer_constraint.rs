@@ -1,8 +1,8 @@
-//! The order of layers, told by the body: along its outward direction an outer garment lies beyond an inner one.
+//! The order of layers: along the outward direction of the body an outer garment lies beyond an inner one.
 //!
 //! The closest point of a folded inner garment may lie on the back of a fold, or on the far side of a sleeve, and its normal
-//! then asks for the wrong way. The direction away from the body is the same for all layers over a place, so that every vertex
-//! looks along it: of all sheets of the inner garment there, the outermost counts.
+//! then points the wrong way. The outward direction is the same for all layers over a place, so every vertex looks along it: of
+//! all sheets of the inner garment there, the outermost counts.
 
 use std::ops::RangeInclusive;
 
@@ -14,7 +14,7 @@ use crate::contact::{Triangle, TriangleTree};
 use crate::mesh::vertex_normals;
 use crate::vec3::{add, add_scaled, dot, neg, norm, normalized, scale, sub};
 
-/// A sheet whose own direction away from the body differs more than this from the vertex's (cosine) lies over another part of
+/// A sheet whose outward direction differs more than this from the vertex's (cosine) lies over another part of
 /// the body: a sleeve is not over the side of the chest.
 const SAME_PART: f64 = 0.5;
 /// A sheet steeper than this (cosine between its normal and the direction away from the body) is left along that direction
@@ -137,7 +137,7 @@ fn sheet_normal(sheet: &Triangle, away: [f64; 3]) -> [f64; 3] {
     }
 }
 
-/// How two crossing triangles have to lie, by their directions away from the body.
+/// How two intersecting triangles have to lie, by their directions away from the body.
 pub(super) enum Order {
     /// The first over the second, along this direction.
     Along([f64; 3]),
@@ -145,7 +145,7 @@ pub(super) enum Order {
     Unknown,
 }
 
-/// The order of two triangles that cross. Where they look at each other (a sleeve and the side of the chest) each has to stay
+/// The order of two triangles that intersect. Where they look at each other (a sleeve and the side of the chest) each has to stay
 /// on its own part's side, whichever garments they belong to; otherwise the outer garment lies over the inner one, and two
 /// folds of one garment have no order.
 pub(super) fn order(first: [u32; 3], second: [u32; 3], is_outer: bool, outward: &[[f64; 3]]) -> Order {
@@ -160,7 +160,7 @@ pub(super) fn order(first: [u32; 3], second: [u32; 3], is_outer: bool, outward: 
     }
 }
 
-/// What two crossing triangles ask for: the first has to lie `gap` over the second along `away`, as far as they cover each
+/// Conditions for two intersecting triangles: the first has to lie `gap` over the second along `away`, as far as they cover each
 /// other.
 pub(super) fn part_along(
     away: [f64; 3],
@@ -209,7 +209,7 @@ pub(super) fn part_from_body(
 }
 
 /// Directions away from the body of all garments, by packed vertex: their normals on the side that most of `away` (from the
-/// body's surface, zero where unknown) tell for a component, smoothed over wrinkles. Unlike the direction from the nearest
+/// body's surface, zero where unknown) say for a component, smoothed over wrinkles. Unlike the direction from the nearest
 /// point of the body they do not change where cloth has gone through other cloth towards another part of the body.
 pub(super) fn outward(
     outfit: &Outfit<'_>,

@@ -1,33 +1,33 @@
-//! The post-process: takes draped garments out of the body and out of each other, and proves what it reached.
+//! The post-process: separates draped garments from the body and from each other, and certifies the result.
 //!
-//! All garments of an outfit are resolved together, so that an inner one gives way to an outer one. First of all the fast pass
-//! ([`fast_pass()`]) parts what is only slightly wrong. What it does not clear goes on:
+//! All garments of an outfit are resolved together, so that an outer one can move an inner one. The fast pass ([`fast_pass()`])
+//! separates slight intersections. What it does not clear goes on:
 //!
-//! 1. **Vertices.** The closest point of the body (of the union of its parts, [`crate::query::UnionDistance`]) leaves a vertex a
-//!    half-space. Along its own direction away from the body it sees the sheets of inner garments, and has to stay over the
-//!    outermost ([`layer_constraint`]); past a hem there is none.
-//! 2. **Triangles.** Vertices outside are not enough where cloth is coarser than the body. Every pair of triangles that crosses,
-//!    found exactly ([`detect`]), asks the part of one over the other to lie above it; linear heights make that sufficient. Which
-//!    one is above is told by the directions away from the body: the outer garment, or, where two sheets look at each other
-//!    (a sleeve and the side of the chest), each on its own part's side, whichever garments they belong to.
-//! 3. **Self-intersections.** Sheets of one garment that cross and have no such order are parted by what most of their vertices say
-//!    ([`self_intersections`]), crumples are smoothed.
-//! 4. **Relaxation.** Vertices on the wrong side and their neighbourhood move by a displacement from the input that is smooth,
-//!    aims at the edge lengths there were, and meets all conditions as far as vertices may move ([`relax`]); everything
-//!    else keeps its position to the bit. Conditions of a crossing are kept for good. Repeated until no pair is left or
-//!    nothing gets better; the best state is taken.
-//! 5. **Certificate.** All pairs are counted again, from nothing, by the exact predicates.
+//! 1. **Vertices.** The closest point of the body (of the union of its parts, [`crate::query::UnionDistance`]) gives a vertex a
+//!    half-space. Along its outward direction a vertex sees the sheets of inner garments and has to stay over the outermost one
+//!    ([`layer_constraint`]); past a hem there is none.
+//! 2. **Triangles.** Vertices outside are not enough where cloth is coarser than the body. For each intersecting triangle pair,
+//!    found exactly ([`detect`]), the overlapping part of one has to lie above the other; heights are linear, so conditions at
+//!    the corners suffice. The outward directions decide which one is above: the outer garment, or, where two sheets face each
+//!    other (a sleeve and the side of the chest), each stays on its own side, whichever garments they belong to.
+//! 3. **Self-intersections.** Sheets of one garment that intersect and have no such order are separated as most of their vertices
+//!    lie ([`self_intersections`]); crumples are smoothed.
+//! 4. **Relaxation.** Vertices that violate a condition and their neighbourhood move by a displacement from the input that is
+//!    smooth, aims at the original edge lengths and meets all conditions within the limits ([`relax`]); all other vertices keep
+//!    their positions bit for bit. Conditions of an intersection are kept. Rounds repeat until no pair is left or none
+//!    improves; the best state is taken.
+//! 5. **Certificate.** All pairs are counted anew by the exact predicates.
 //!
-//! **Pinched regions**, where the body lies inside itself, are told apart by a stated rule: `BodyObstacle`. There, and where
-//! hardly any cloth fits between two parts, the body gives way ([`clearance`]) where crossings are left otherwise; in the
-//! end garments are brought out of it again where they can.
+//! **Pinched regions**, where the body lies inside itself, are counted apart ([`BodyObstacle`](obstacle::BodyObstacle) states the
+//! rule). If intersections remain there, or where hardly any cloth fits between two parts, the body yields ([`clearance`]);
+//! afterwards garments leave that clearance again where they can ([`withdrawal`]).
 //!
-//! **Once more.** Where few crossings are left, what was reached is resolved like a new drape.
+//! **Continued attempts.** If few intersections remain, the result is resolved like a new drape ([`attempt`]).
 //!
-//! **Strain.** Where the strain energy has risen, cloth gives back what it can without crossing anything ([`strain_relaxation`]).
+//! **Strain.** If the strain energy has risen, edges relax without making an intersection ([`strain_relaxation`]).
 //!
-//! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
-//! step by step to the pose ([`continuation`], [`path`]); in short steps cloth keeps the sides it was on before ([`sides`]).
+//! **Bent limbs.** If intersections remain, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
+//! step by step to the pose ([`continuation`], [`path`]); in short steps cloth keeps its [`contact_orientation`].
 
 mod attempt;
 mod body;
@@ -35,6 +35,7 @@ mod budget;
 mod certificate;
 mod clearance;
 mod contact;
+mod contact_orientation;
 mod continuation;
 mod count;
 mod defects;
@@ -48,12 +49,11 @@ mod obstacle;
 mod outfit;
 mod path;
 mod path_sample;
+mod path_samples;
 mod relax;
 mod resolved;
 mod self_intersections;
 mod settings;
-mod sides;
-mod stages;
 mod step_lengths;
 mod strain_relaxation;
 #[cfg(test)]
@@ -62,7 +62,7 @@ mod untangle;
 mod withdrawal;
 
 pub use certificate::{
-    Certificate, Crossed, GarmentCertificate, LayerCertificate, PinchedPairs, RemainingPair,
+    Certificate, GarmentCertificate, IntersectedSurface, LayerCertificate, PinchedPairs, RemainingPair,
 };
 pub use continuation::{resolve_after, resolve_along};
 pub use count::certify;
@@ -71,7 +71,7 @@ pub use error::ResolveError;
 pub use fast_pass::fast_pass;
 use fast_pass::passed_near;
 pub use garment::{FARTHEST, Layer, RestGarment};
-pub use path_sample::{PathSample, Reached};
+pub use path_sample::{ContactState, PathSample};
 pub use resolved::{GarmentWork, Resolved};
 pub use settings::ResolveSettings;
 
@@ -83,7 +83,7 @@ use attempt::resolved_further;
 ///
 /// # Errors
 /// When a setting is out of range, positions do not fit their garment or are not finite, a garment has a face twice, or
-/// the body has no surface. Crossings that cannot be mended are no error: the certificate lists them.
+/// the body has no surface. Intersections that cannot be mended are no error: the certificate lists them.
 pub fn resolve(
     body: &Surface<f64>,
     layers: &[Layer<'_>],

@@ -1,4 +1,4 @@
-//! Which part of the body clothes can meet: a tight top asks nothing of ten fingers, which are half of the body's triangles.
+//! Broad phase: the part of the body that clothes can meet. Ten fingers are half of the body's triangles and far from a tight top.
 
 use crate::vec3::is_finite;
 use std::ops::Range;
@@ -10,7 +10,7 @@ const REACH: usize = 2;
 /// Cloth over a box of more cells, 125 m³ here, is near everything.
 const MOST_CELLS: f64 = 1e6;
 
-/// So far cloth may move (m) and still meet nothing of the body but what is near; a little less than all, for rounding.
+/// Cloth that moves no farther than this (m) meets only faces that are near; a little less than all, for rounding.
 pub(super) const MARGIN: f64 = REACH as f64 * CELL * (1.0 - 1e-9);
 
 /// Which vertices of a surface belong to a face near a triangle of the cloth, given as positions and faces of each garment;
@@ -153,7 +153,7 @@ mod tests {
         assert!(near(&far).iter().all(|n| *n), "a body that is nowhere near is taken whole");
     }
 
-    /// No corner of the large face is anywhere near the cloth that crosses its middle.
+    /// No corner of the large face is anywhere near the cloth that intersects its middle.
     #[test]
     fn a_coarse_body_is_near_by_its_faces() {
         let points = [

@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 /// Below this distance (m) the direction from the closest point is rounding.
 const CONTACT: f64 = 1e-9;
 
-/// What a point knows of the body.
+/// The body as seen from a point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BodyView {
     /// Distance to the nearest exposed face, without sign (m).
@@ -23,14 +23,14 @@ pub(super) struct BodyView {
 ///
 /// **Pinched regions.** Where one part of the body lies inside another (an arm pressed into the torso), no cloth can be
 /// outside of both. The rule (after Baraff, Witkin and Kass, "Untangling cloth", 2003): faces inside another part of the
-/// body, the seams where parts cross, and the faces next to those are *pinched*. They push nothing, and what crosses them is
+/// body, the seams where parts cross, and the faces next to those are *pinched*. They push nothing, and what intersects them is
 /// counted apart. A vertex inside the body whose nearest face, of all, is pinched is left alone.
 pub(super) struct BodyObstacle<'a> {
     pub tree: TriangleTree<'a>,
     is_pinched: Vec<bool>,
     has_pinched: bool,
-    /// Faces that give way.
-    pub(super) gave_way: Vec<bool>,
+    /// Faces that yield.
+    pub(super) yielded: Vec<bool>,
     /// Of a surface without a border: inside and outside are known everywhere.
     pub union: Option<UnionDistance>,
     /// All faces near cloth; made when it is first asked.
@@ -63,8 +63,8 @@ impl<'a> BodyObstacle<'a> {
         }
         let is_pinched = touching(faces, &touched);
         let has_pinched = is_pinched.contains(&true);
-        let gave_way = Vec::new();
-        Self { tree, is_pinched, has_pinched, gave_way, union, all: OnceLock::new(), surface, near }
+        let yielded = Vec::new();
+        Self { tree, is_pinched, has_pinched, yielded, union, all: OnceLock::new(), surface, near }
     }
 
     /// Whether face `f` is pinched.
@@ -72,9 +72,9 @@ impl<'a> BodyObstacle<'a> {
         self.is_pinched.get(f as usize).is_some_and(|p| *p)
     }
 
-    /// Whether face `f` gives way, to make room for cloth.
-    pub fn gave_way(&self, f: u32) -> bool {
-        self.gave_way.get(f as usize).is_some_and(|p| *p)
+    /// Whether face `f` yields, to leave clearance for cloth.
+    pub fn yielded(&self, f: u32) -> bool {
+        self.yielded.get(f as usize).is_some_and(|p| *p)
     }
 
     /// The nearest of all faces near cloth, whatever the side.
@@ -92,7 +92,7 @@ impl<'a> BodyObstacle<'a> {
         self.has_pinched && self.is_pinch(scale(add(add(*a, *b), *c), 1.0 / 3.0))
     }
 
-    /// What the body is to a point; `None` where it is not near cloth.
+    /// The body as seen from `p`; `None` where it is not near cloth.
     pub fn look(&self, p: [f64; 3]) -> Option<BodyView> {
         let (found, mut is_inside) = match &self.union {
             Some(union) => union.project(p)?,
@@ -103,7 +103,7 @@ impl<'a> BodyObstacle<'a> {
         };
         let far = found.distance_squared.sqrt();
         if far >= MARGIN {
-            // The nearest face may not be near cloth, and another one's normal tells nothing.
+            // The nearest face may not be near cloth, and the normal of another one says nothing.
             is_inside = self.union.as_ref().is_some_and(|union| union.winding_number(p) >= 1);
         }
         let distance = if is_inside { -far } else { far };
@@ -153,7 +153,7 @@ mod tests {
 
     /// The nearest face of the part that is near cloth looks the other way.
     #[test]
-    fn what_is_far_from_the_body_is_outside_of_it() {
+    fn a_point_far_from_the_body_is_outside() {
         let body = Surface::from_mesh(&shapes::icosphere(0.5, 3));
         let near: Vec<bool> = body.positions.iter().map(|p| p[0] > 0.3).collect();
         let obstacle = BodyObstacle::new(&body, &near);

@@ -1,11 +1,11 @@
-//! A pose on the path to another, and garments that are resolved there.
+//! States along a continuation path.
 
 use std::sync::Arc;
 
 use crate::query::Surface;
 use crate::transform::Transform;
 
-/// What is somewhere along the path.
+/// The body and the drape at one share of a continuation path.
 #[derive(Clone)]
 pub struct PathSample {
     /// The body.
@@ -16,14 +16,14 @@ pub struct PathSample {
     pub transforms: Vec<Transform>,
 }
 
-/// Garments that are resolved, as far as they could be: where a path starts.
-pub struct Reached {
-    /// Their drape before that, `[V, 3]` each (m).
+/// Resolved garments from which a continuation path starts.
+pub struct ContactState {
+    /// The drape before the post-process, `[V, 3]` per garment (m).
     pub draped: Vec<Vec<[f64; 3]>>,
-    /// Where they are now.
+    /// The resolved positions, `[V, 3]` per garment (m).
     pub positions: Vec<Vec<[f64; 3]>>,
     /// Skinning transforms, as in [`PathSample`].
     pub transforms: Vec<Transform>,
-    /// Pairs with the body and between garments that are left in `positions`, but for narrow and pinched ones.
-    pub crossings: usize,
+    /// Intersecting pairs with the body and between garments left in `positions`, without narrow and pinched ones.
+    pub intersections: usize,
 }

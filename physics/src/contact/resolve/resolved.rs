@@ -1,4 +1,4 @@
-//! What the post-process reached, and how it is judged.
+//! The result of the post-process.
 
 use std::time::Duration;
 
@@ -17,8 +17,8 @@ pub struct Resolved {
     pub certificate: Certificate,
     /// What was done, per garment.
     pub garments: Vec<GarmentWork>,
-    /// Steps that were tried: from the T-pose, by [`super::resolve_along`] (0 where the drape could be mended as it
-    /// was), or from the frame before, by [`super::resolve_after`].
+    /// Steps tried on a continuation path: from the T-pose, by [`super::resolve_along`] (0 if the drape needed no path), or from
+    /// the frame before, by [`super::resolve_after`].
     pub steps: usize,
     /// Rounds of detection and relaxation of all stages but the fast pass.
     pub rounds: usize,
@@ -73,7 +73,7 @@ impl Resolved {
         }
     }
 
-    /// Tells moves and strain from `layers`, and what all the work of `budget` took.
+    /// Sets moves and strain relative to `layers`, and the time that `budget` counted.
     pub(super) fn compare_since(&mut self, layers: &[Layer<'_>], budget: &Budget) {
         (self.body_time, self.certificate_time) = (budget.body_time(), budget.certificate_time());
         let time = budget.elapsed().saturating_sub(self.body_time + self.certificate_time);

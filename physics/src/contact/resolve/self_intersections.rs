@@ -1,6 +1,6 @@
-//! Crossings of a garment with itself: which side of which sheet is the right one, and what that asks for.
+//! Self-intersections of a garment: on which side of each other its sheets belong, and the conditions for it.
 //!
-//! No order of layers says it. As in "Untangling cloth" (Baraff, Witkin and Kass 2003) the curve in which two sheets cross
+//! No order of layers decides. As in "Untangling cloth" (Baraff, Witkin and Kass 2003) the curve in which two sheets intersect
 //! cuts each of them in two, and the smaller part is the one that went astray. Where one sheet runs into itself next to a
 //! fold, or a fold is crumpled, there are no two sheets; there the cloth is smoothed.
 
@@ -11,10 +11,10 @@ use super::contact::{Contact, is_tiny, normal_of, overlap};
 use super::outfit::Outfit;
 use crate::vec3::{add, cross, dot, neg, scale, sub};
 
-/// Rings around a crossing that are counted to tell the smaller side.
+/// Rings around an intersection that are counted to find the smaller side.
 const COUNTED_RINGS: usize = 10;
 
-/// What the crossings of a garment with itself ask for.
+/// Conditions for the self-intersections of a garment.
 #[derive(Debug, Default)]
 pub(super) struct PartingConditions {
     /// Conditions that part two sheets.
@@ -23,7 +23,7 @@ pub(super) struct PartingConditions {
     pub crumpled: Vec<u32>,
 }
 
-/// Looks at `pairs` of crossing faces (each ascending) at `positions`; sheets are parted by `gap`.
+/// Looks at `pairs` of intersecting faces (each ascending) at `positions`; sheets are parted by `gap`.
 fn parting_conditions(
     garment: &RestGarment,
     positions: &[[f64; 3]],
@@ -33,7 +33,7 @@ fn parting_conditions(
     let mut found = PartingConditions::default();
     let faces = &garment.faces;
     let sheets = Sheets::new(garment, pairs);
-    let mut crossings: HashMap<(u32, u32), Vec<(u32, u32)>> = HashMap::new();
+    let mut intersections: HashMap<(u32, u32), Vec<(u32, u32)>> = HashMap::new();
     let mut order: Vec<(u32, u32)> = Vec::new();
     for &(f, g) in pairs {
         let (a, b) = (sheets.of(f), sheets.of(g));
@@ -42,14 +42,14 @@ fn parting_conditions(
             continue;
         }
         let (key, pair) = if a < b { ((a, b), (f, g)) } else { ((b, a), (g, f)) };
-        let known = crossings.entry(key).or_insert_with(|| {
+        let known = intersections.entry(key).or_insert_with(|| {
             order.push(key);
             Vec::new()
         });
         known.push(pair);
     }
     for key in order {
-        let pairs = &crossings[&key];
+        let pairs = &intersections[&key];
         let turned: Vec<(u32, u32)> = pairs.iter().map(|&(f, g)| (g, f)).collect();
         let (one, other) = (vote(garment, positions, pairs), vote(garment, positions, &turned));
         // The clearer of the two sheets decides.
@@ -64,8 +64,8 @@ fn parting_conditions(
 }
 
 /// Conditions that part `pairs` of faces at `positions`, each of one garment, one garment after the other, and the vertices of
-/// crumples. Those are smoothed (in positions and shape): for good in a garment with a pair that is `known` from the input; in
-/// others what was done to them is taken back.
+/// crumples. Those are smoothed: in positions and shape where a garment has a pair `known` from the input; otherwise towards the
+/// shape.
 pub(super) fn part_self_intersections(
     outfit: &Outfit<'_>,
     (pairs, known): (&[(u32, u32)], &[(u32, u32)]),
@@ -101,7 +101,7 @@ pub(super) fn part_self_intersections(
     (contacts, crumpled)
 }
 
-/// Faces of the crossings that hang together.
+/// Connected components of the intersecting faces.
 struct Sheets {
     root_of: HashMap<u32, u32>,
 }
@@ -138,8 +138,8 @@ impl Sheets {
     }
 }
 
-/// How clearly the first faces' sheet belongs above (positive) or below the second ones': its vertices above less those below
-/// the curve, as a share, counted ring by ring away from the curve.
+/// How clearly the sheet of the first faces belongs above (positive) or below that of the second ones: its vertices above minus
+/// those below the curve, as a share, counted ring by ring away from the curve.
 fn vote(garment: &RestGarment, positions: &[[f64; 3]], pairs: &[(u32, u32)]) -> f64 {
     let mut heights: HashMap<u32, f64> = HashMap::new();
     let mut front: Vec<u32> = Vec::new();

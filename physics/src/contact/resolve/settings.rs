@@ -8,7 +8,7 @@ use super::ResolveError;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResolveSettings {
     /// Distance from the body that a vertex gets when it has to move (m), a tenth more in each round up to three times as much;
-    /// the same over an inner garment, half of it where triangles cross; three tenths between parts of the body that are too
+    /// the same over an inner garment, half of it where triangles intersect; three tenths between parts of the body that are too
     /// near to each other for more. Default 1 mm.
     pub gap: f64,
     /// A vertex has to move where its distance is below this share of `gap`, 0–1. Default 0.25: whatever was resolved once
@@ -23,18 +23,18 @@ pub struct ResolveSettings {
     /// Deepest that an outer vertex may lie below an inner layer and still be brought back over it (m). Default 5 cm, as far as
     /// the order of layers is judged.
     pub reach: f64,
-    /// Farthest that any vertex may be moved (m). Default 6 cm: what asks for more (an order that cannot be worn, a part of the
-    /// body inside another one) would tear the garment instead of mending it, and is left and listed.
+    /// Farthest that any vertex may be moved (m). Default 6 cm: what asks for more (an order that is not feasible, a part of the
+    /// body inside another one) would stretch the garment beyond use, and is left and listed.
     pub farthest: f64,
     /// Longest that an edge should get, as a share of its length in the input. Default 1.15: cloth gives a little, and a place
     /// that asks for more is left and listed. Contacts come last in a round, so that single edges get longer.
     pub stretch: f64,
-    /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken if it ends
+    /// How many times wider both limits are in a second attempt, where intersections are left; its result is only taken if it ends
     /// with none. Where few are left in the end, all is tried again from there and both limits are measured anew. Default 6; 1
     /// for strict limits: no attempt begins where another one ended, and added strain is not relaxed.
     pub loosened: f64,
     /// Most steps on a path: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
-    /// Default 128; 0 mends the drape as it is or not at all.
+    /// Default 128; 0: no path.
     pub steps: usize,
     /// Whether nothing lies deeper than half a limb, so that the nearest way out is the right one: true for a small step.
     /// Default no.

@@ -7,13 +7,13 @@ use super::clearance::Clearance;
 pub(super) struct StepLengths {
     /// The longest one.
     pub longest: f64,
-    /// The shortest one: it is taken even where it leaves more crossings than there were.
+    /// The shortest one: it is taken even where it leaves more intersections than there were.
     pub shortest: f64,
-    /// The longest one in which cloth may keep its sides: little passes by in it.
+    /// The longest one in which cloth may keep its contact orientation: little slides past in it.
     pub keeping: f64,
-    /// Whether it does so at first, and otherwise where that leaves crossings; or the other way round.
+    /// Whether that is tried first, and without orientation where it leaves intersections; or the other way round.
     pub keeps_first: bool,
-    /// Where the body gives way, from step to step by little more or less.
+    /// Where the body yields.
     pub clearance: Clearance,
 }
 

@@ -1,8 +1,8 @@
-//! Cloth that was stretched or pressed together on its way gives back what it can.
+//! Strain relaxation: cloth that was stretched or compressed returns towards its rest lengths.
 //!
-//! Taking garments out of the body and of each other keeps the lengths of edges only as far as contacts allow, and what one
-//! round needs the next may not. Where the strain energy has risen in the end, edges are taken back towards their rest lengths
-//! by small moves. Each of them passes the step filter, so that it makes no intersection, and is taken if the energy is lower.
+//! Untangling keeps edge lengths only as far as contacts allow, and a stretch that one round needs may not be needed later. If the
+//! strain energy has risen in the end, small moves bring edges towards their rest lengths. Each move passes the step filter, so
+//! that it makes no intersection, and is taken if the energy falls.
 
 use super::budget::Budget;
 use super::certificate::strain_joule;
@@ -82,7 +82,7 @@ pub(super) fn contact_mesh<'a>(
     ContactMesh::new(outfit.vertex_count() + body_vertices, &outfit.faces, body_faces)
 }
 
-/// Garments whose edges give back what they can.
+/// Garments whose edges relax.
 pub(super) struct StrainRelaxation<'a> {
     /// The garments as they were before the post-process.
     outfit: &'a Outfit<'a>,
@@ -97,7 +97,7 @@ impl<'a> StrainRelaxation<'a> {
         Self { outfit, margin: settings.trigger * settings.gap, only_stretched: true }
     }
 
-    /// Eases the garments at the start of `positions`, those of the `filter`, until their strain energy is what it was before
+    /// Relaxes the garments at the start of `positions`, those of the `filter`, until their strain energy is what it was before
     /// the post-process, a move gains too little, or `is_late`.
     pub fn relax_strain(
         mut self,
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_pulled_gives_back_without_a_crossing() {
+    fn pulled_cloth_relaxes_without_intersections() {
         let (body, garment, sheet) = ball_and_sheet();
         let layers = [Layer { garment: &garment, positions: &sheet }];
         let crumpled = vec![pulled(&sheet, 0.002)];

@@ -121,7 +121,7 @@ fn a_tight_tube_is_widened_over_a_trunk() {
 }
 
 #[test]
-fn layers_that_cross_are_parted_in_order() {
+fn layers_that_intersect_are_parted_in_order() {
     let trunk = shapes::icosphere(0.15, 3);
     // A straight tube, and one that waves in and out through it.
     let inner = moved(&shapes::tube(0.165, 0.2, 48, 16), [0.0, -0.1, 0.0]);
@@ -139,7 +139,7 @@ fn reversed_layers_change_places() {
     let trunk = shapes::icosphere(0.15, 3);
     let wide = moved(&shapes::tube(0.175, 0.2, 48, 16), [0.0, -0.1, 0.0]);
     let narrow = moved(&shapes::tube(0.165, 0.2, 44, 15), [0.0, -0.1, 0.0]);
-    // The narrow one is to be worn over the wide one: nothing crosses, but the order is wrong.
+    // The narrow one is to be worn over the wide one: nothing intersects, but the order is wrong.
     let scene = Scene::new(&trunk, &[wide, narrow]);
     let before = certify(&scene.body, &scene.layers()).unwrap();
     assert!(before.is_clear() && before.order_violations > 0.9, "{before:?}");
@@ -291,7 +291,7 @@ fn no_vertex_goes_farther_and_no_edge_gets_longer_than_allowed() {
 
 #[test]
 fn arms_inside_a_trunk_are_pinched_and_told_apart() {
-    // Two overlapping balls, each in its own bag: where the balls overlap the bags cannot but cross.
+    // Two overlapping balls, each in its own bag: where the balls overlap the bags cannot but intersect.
     let left = moved(&shapes::icosphere(0.1, 3), [-0.06, 0.0, 0.0]);
     let right = moved(&shapes::icosphere(0.1, 3), [0.06, 0.0, 0.0]);
     let body = shapes::union(&[&left, &right]);
@@ -377,10 +377,10 @@ fn of_two_results_the_one_with_fewer_crossings_counts_and_the_work_of_both() {
         torn
     };
     // Intersections come first, then narrow pairs, then torn cloth.
-    let (crossed, narrow, clear) = (result(8, 0, 0, 1), result(10, 10, 0, 2), result(0, 0, 0, 4));
+    let (intersected, narrow, clear) = (result(8, 0, 0, 1), result(10, 10, 0, 2), result(0, 0, 0, 4));
     for (first, second, best) in [
-        (&crossed, &narrow, &narrow),
-        (&narrow, &crossed, &narrow),
+        (&intersected, &narrow, &narrow),
+        (&narrow, &intersected, &narrow),
         (&narrow, &clear, &clear),
         (&clear, &narrow, &clear),
         (&result(2, 2, 1, 0), &result(1, 0, 0, 0), &result(1, 0, 0, 0)),
@@ -388,7 +388,7 @@ fn of_two_results_the_one_with_fewer_crossings_counts_and_the_work_of_both() {
         (&torn(1.1), &torn(0.4), &torn(0.4)),
         // A little more strain is no reason to take another result.
         (&torn(0.4), &torn(0.1), &torn(0.4)),
-        (&crossed, &torn(30.0), &torn(30.0)),
+        (&intersected, &torn(30.0), &torn(30.0)),
     ] {
         let found = first.clone().or(second.clone());
         assert_eq!(found.certificate, best.certificate);

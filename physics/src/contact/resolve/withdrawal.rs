@@ -1,32 +1,31 @@
-//! Where cloth lies in clearance that the body only made for it, tries to do without: the body gives way no more than where it lies
-//! inside itself.
+//! Takes cloth out of clearance again: afterwards the body yields only where it lies inside itself.
 
 use super::body::Body;
 use super::budget::Budget;
 use super::clearance::Clearance;
+use super::contact_orientation::ContactOrientation;
 use super::count::certified;
 use super::garment::at;
 use super::outfit::Outfit;
-use super::sides::Sides;
 use super::untangle::{untangled, untangled_keeping};
 use super::{Layer, ResolveSettings, Resolved};
 
 /// Longest and shortest step, as shares of the clearance that the body made, by which it is taken back.
 const STEPS: (f64, f64) = (1.0 / 4.0, 1.0 / 32.0);
-/// Gaps with which that is tried, as shares of the one asked for: what is narrow holds more sheets that lie closer to each other.
+/// Gaps tried, as shares of the setting: a narrow place holds more sheets if they lie closer.
 const GAPS: [f64; 2] = [1.0, 0.3];
 
-/// A body that takes back the clearance it made.
+/// A body that withdraws its clearance.
 pub(super) struct ClearanceWithdrawal<'a, 'b> {
     pub body: &'a Body<'b>,
-    /// The garments as they were before all of it.
+    /// The garments before the post-process.
     pub layers: &'a [Layer<'a>],
     pub clearance: Clearance,
     pub budget: &'a Budget,
 }
 
 impl ClearanceWithdrawal<'_, '_> {
-    /// Takes what comes of it if it has fewer defects than the `best` so far.
+    /// The result replaces `best` if it has fewer defects.
     pub fn improve(&self, best: &mut Resolved, settings: &ResolveSettings) {
         for share in GAPS {
             if best.certificate.narrow_triangle_pairs == 0 || self.budget.is_spent() {
@@ -38,7 +37,7 @@ impl ClearanceWithdrawal<'_, '_> {
         }
     }
 
-    /// All at once and, where no garment crosses another, step by step as well.
+    /// All at once and, if no garment intersects another, step by step as well.
     fn at_once(&self, best: &mut Resolved, settings: &ResolveSettings) {
         let apart = (best.certificate.layer_triangle_pairs == 0).then(|| best.positions.clone());
         let now = at(self.layers, &best.positions);
@@ -52,16 +51,16 @@ impl ClearanceWithdrawal<'_, '_> {
         }
     }
 
-    /// Step by step from `now`, where no garment crosses another: the body comes back by and by, and cloth keeps its sides.
+    /// Step by step from `now`, where no garment intersects another; cloth keeps its contact orientation.
     fn slowly(&self, best: &mut Resolved, mut now: Vec<Vec<[f64; 3]>>, settings: &ResolveSettings) {
         let outfit = Outfit::new(self.layers);
         let (mut share, mut step, mut with_body) = (1.0, STEPS.0, usize::MAX);
         while share > 0.0 && step >= STEPS.1 && !self.budget.is_spent() {
             let next = f64::max(share - step, 0.0);
-            let sides = Sides::of(&outfit, &now.concat(), None);
+            let orientation = ContactOrientation::of(&outfit, &now.concat(), None);
             let before = at(self.layers, &now);
             let found = self.body.with_clearance(self.clearance.with_share(next), |obstacle| {
-                untangled_keeping(Some(&sides), obstacle, &before, settings, self.budget)
+                untangled_keeping(Some(&orientation), obstacle, &before, settings, self.budget)
             });
             let certificate = certified(&self.body.drawn, self.layers, &found.positions);
             if certificate.layer_triangle_pairs == 0 && found.with_body <= with_body {

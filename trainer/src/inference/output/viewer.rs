@@ -13,7 +13,7 @@ use crate::picture::{BODY_COLOUR, layer_colour};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use clothcombo_data::format::atomic;
-use clothcombo_physics::contact::resolve::{Certificate, Crossed, certify};
+use clothcombo_physics::contact::resolve::{Certificate, IntersectedSurface, certify};
 use clothcombo_physics::mesh::vertex_stretch;
 use clothcombo_physics::query::Distance;
 use rayon::prelude::*;
@@ -138,39 +138,40 @@ fn stage<'a>(
             &counted
         }
     };
-    let crossing = crossing_vertices(show, certificate);
+    let intersecting = intersecting_vertices(show, certificate);
     let heat = garments.iter().enumerate().map(|(layer, positions)| {
         let strain = vertex_stretch(&show.outfit.garments[layer].prepared.garment.rest, positions);
         let gaps: Vec<f64> =
             positions.par_iter().with_min_len(256).map(|p| surface.gap(*p, Distance::Union).gap).collect();
-        let bytes = strain.iter().zip(gaps).zip(&crossing[layer]).flat_map(|((strain, gap), crosses)| {
-            let strain = (255.0 * (strain / STRAIN).min(1.0)).round() as u8;
-            [strain, if *crosses { 0 } else { gap_byte(1e3 * gap) }]
-        });
+        let bytes =
+            strain.iter().zip(gaps).zip(&intersecting[layer]).flat_map(|((strain, gap), intersects)| {
+                let strain = (255.0 * (strain / STRAIN).min(1.0)).round() as u8;
+                [strain, if *intersects { 0 } else { gap_byte(1e3 * gap) }]
+            });
         bytes.collect()
     });
     Ok(Stage { name, time, body: &drape.body, heat: heat.collect(), garments })
 }
 
 /// Per garment whether a vertex belongs to a triangle that intersects something.
-fn crossing_vertices(show: &Show, certificate: &Certificate) -> Vec<Vec<bool>> {
+fn intersecting_vertices(show: &Show, certificate: &Certificate) -> Vec<Vec<bool>> {
     let garments = &show.outfit.garments;
-    let mut crossing: Vec<Vec<bool>> =
+    let mut intersecting: Vec<Vec<bool>> =
         garments.iter().map(|p| vec![false; p.prepared.vertex_count()]).collect();
     let mut mark = |garment: usize, triangle: usize| {
         if let Some(face) = garments[garment].prepared.garment.rest.faces().get(triangle) {
-            face.iter().for_each(|v| crossing[garment][*v as usize] = true);
+            face.iter().for_each(|v| intersecting[garment][*v as usize] = true);
         }
     };
     for pair in &certificate.remaining {
         mark(pair.garment, pair.triangle);
-        match pair.crosses {
-            Crossed::Body => {}
-            Crossed::Layer(other) => mark(other, pair.other_triangle),
-            Crossed::Itself => mark(pair.garment, pair.other_triangle),
+        match pair.intersects {
+            IntersectedSurface::Body => {}
+            IntersectedSurface::Layer(other) => mark(other, pair.other_triangle),
+            IntersectedSurface::Itself => mark(pair.garment, pair.other_triangle),
         }
     }
-    crossing
+    intersecting
 }
 
 /// 1–255 within [`GAP`]; 0 is for what intersects.
@@ -253,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_keep_the_lowest_number_for_crossings() {
+    fn gaps_keep_the_lowest_number_for_intersections() {
         assert_eq!([gap_byte(-50.0), gap_byte(GAP[0]), gap_byte(GAP[1]), gap_byte(900.0)], [1, 1, 255, 255]);
     }
 }

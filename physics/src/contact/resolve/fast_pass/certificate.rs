@@ -38,14 +38,14 @@ impl ReportBody for FastPass<'_> {
         let of = |f: u32| (!self.filter.mesh.is_body(f)).then(|| self.outfit.garment_of_face(f));
         let first = |g: usize| self.outfit.faces_of_garment(g).start;
         // The inner garment comes first in the pairs of the filter, the body last.
-        let is_own = with == Some(garment);
+        let is_self_pair = with == Some(garment);
         let local = |&(f, g): &(u32, u32)| match with {
             None => (of(f) == Some(garment))
                 .then_some(())
                 .and_then(|()| Some((f - first(garment), self.body_face(g)?))),
             Some(inner) if of(f) == Some(inner) && of(g) == Some(garment) => {
                 let (f, g) = (f - first(inner), g - first(garment));
-                Some(if is_own { (f, g) } else { (g, f) })
+                Some(if is_self_pair { (f, g) } else { (g, f) })
             }
             Some(_) => None,
         };

@@ -1,4 +1,4 @@
-//! Where an outfit is wrong, and what has to hold there.
+//! Where an outfit intersects, and the conditions there.
 
 use super::FastPass;
 use crate::contact::resolve::contact::{Contact, Plane, along_line, is_tiny, normal_of};
@@ -9,16 +9,16 @@ use crate::contact::step_filter::{Bounds, ElementPair, closest_on_edges};
 use crate::vec3::{add, add_scaled, cross, dot, normalized, scale, sub};
 use rayon::prelude::*;
 
-/// What is nearer than this is kept apart (m).
+/// Elements nearer than this are kept apart (m).
 const NEAR: f64 = 0.003;
-/// Elements of garments that are deeper in each other than this (m) are told by the sheets around them, not by their own planes.
+/// Deeper in each other than this (m), elements of garments are ordered by the sheets around them, not by their own planes.
 const DEEP: f64 = 0.012;
 /// How far under an inner garment an outer one is still brought over it (m): half a thin limb.
 const REACH: f64 = 0.025;
 /// Contacts between elements whose directions differ more than this (cosine) are left to others near them.
 const ALONG: f64 = 0.6;
 
-/// Where an outfit is wrong.
+/// The part of an outfit that may move.
 #[derive(Default)]
 pub(super) struct DefectRegion {
     /// The vertices that may move: those on the wrong side or of triangles that intersect, and their neighbourhood; ascending.
@@ -31,7 +31,7 @@ pub(super) struct DefectRegion {
 }
 
 impl FastPass<'_> {
-    /// What is wrong now. Vertices on the wrong side are looked for from triangles that intersect outward.
+    /// The defects now: vertices on the wrong side are searched outward from intersecting triangles.
     pub(super) fn defects(&self) -> DefectRegion {
         let outfit = self.outfit;
         let mut found = DefectRegion { is_in: vec![false; self.input.len()], ..DefectRegion::default() };
@@ -74,8 +74,8 @@ impl FastPass<'_> {
         let plane = self.planes[v as usize].filter(|plane| plane.distance < NEAR);
         // More than half way through a limb the nearest way out is its other side: cloth goes back to its own.
         let is_through = plane.is_some_and(|plane| plane.distance < 0.0 && dot(plane.normal, away) < 0.0);
-        let own = if is_through { self.body.exit(p, away, self.settings.farthest) } else { None };
-        (own.or(plane), self.sheets_over(v))
+        let back = if is_through { self.body.exit(p, away, self.settings.farthest) } else { None };
+        (back.or(plane), self.sheets_over(v))
     }
 
     /// Of every inner garment the outermost sheet that lies less than [`REACH`] over vertex `v`.
@@ -263,8 +263,8 @@ impl FastPass<'_> {
             .flatten()
     }
 
-    /// How deep in each other (m) elements are still told by their own planes: vertices know better how deep they are
-    /// in the body.
+    /// How deep in each other (m) elements are still ordered by their own planes: in the body, vertices know better how deep they
+    /// are.
     fn deepest(&self, pair: &ElementPair) -> f64 {
         let is_body = |v: &u32| *v as usize >= self.input.len();
         if pair.vertices.iter().any(is_body) { self.settings.gap } else { DEEP }

@@ -1,10 +1,10 @@
-//! The fast pass: what the networks leave, slight penetrations, is parted where it is, in some ten milliseconds.
+//! The fast pass: separates the slight penetrations that the networks leave, in some ten milliseconds.
 //!
 //! Triangles that intersect, found exactly, and vertices on the wrong side around them tell where; conditions there and
 //! on what is near ([`conditions`]) are met by a few smooth sweeps over two rings of neighbours ([`relax`]). Rounds
 //! move freely as long as they help: cloth that lies deeper than one triangle could not come out through the step
 //! filter. The last ones are filtered, so that they make no new intersection. What parted triangles once is asked for
-//! in all later rounds. It ends when nothing intersects, or when rounds no longer help: the rest is for the next stage.
+//! in all later rounds. It ends when nothing intersects, or when rounds no longer help: the rest is left to relaxation.
 
 mod certificate;
 mod conditions;
@@ -40,11 +40,11 @@ const ROUNDS: usize = 20;
 const STALLED: f64 = 0.8;
 /// After so many rounds that hardly helped steps are filtered…
 const FREE_STALLS: usize = 3;
-/// …and after so many the outfit is left to the next stage.
+/// …and after so many the outfit is left to relaxation.
 const STALLS: usize = 5;
 /// More intersections than this after a round that hardly helped are not for the fast pass.
 const MANY: usize = 200;
-/// How far sheets of one garment are parted, as a share of the gap.
+/// Distance to which sheets of one garment are separated, as a share of the gap.
 const SELF_GAP: f64 = 0.25;
 /// A share of vertices under an inner garment from which whole parts lie on the wrong side without intersecting anything.
 const ORDER_VIOLATIONS: f64 = 1e-2;
@@ -52,8 +52,8 @@ const ORDER_VIOLATIONS: f64 = 1e-2;
 const FILTER_MARGIN: f64 = 0.05;
 
 /// Takes `layers`, innermost first, out of `body` and out of each other where they lie hardly in: the result if no garment
-/// intersects the body or another one any more, at most eight triangles of garments intersect others of their own, and no cloth is
-/// torn; else none. Deterministic for any number of threads; a clean input comes back to the bit.
+/// intersects the body or another one any more, at most eight pairs of triangles of one garment intersect, and no cloth has
+/// excess strain; else none. Deterministic for any number of threads; a clean input comes back to the bit.
 ///
 /// # Errors
 /// Those of [`super::resolve`].
@@ -91,7 +91,7 @@ pub(super) fn passed_near(
     };
     if pass.between() > 0
         || pass.parted_self_intersections().count() > most_self_intersections
-        || pass.own().count() > pass.known_self_intersections.len()
+        || pass.self_pairs().count() > pass.known_self_intersections.len()
     {
         return None;
     }
@@ -111,8 +111,8 @@ fn mends_self_intersections(settings: &ResolveSettings) -> bool {
     settings.self_contact && settings.loosened > 1.0
 }
 
-/// Whether nothing is left for another stage: neither what intersects, nor more than `most_self_intersections` pairs of garments
-/// with themselves, nor whole parts on the wrong side, nor torn cloth.
+/// Whether nothing is left to relaxation: no intersection, at most `most_self_intersections` pairs of garments with themselves, no
+/// whole part on the wrong side, no excess strain.
 fn is_good(certificate: &Certificate, most_self_intersections: usize) -> bool {
     certificate.is_clear()
         && certificate.self_triangle_pairs <= most_self_intersections
@@ -121,7 +121,7 @@ fn is_good(certificate: &Certificate, most_self_intersections: usize) -> bool {
         && certificate.excess_strain() == 0
 }
 
-/// An outfit on its way.
+/// The state of an outfit between rounds.
 struct FastPass<'a> {
     outfit: &'a Outfit<'a>,
     body: &'a BodyObstacle<'a>,
@@ -132,13 +132,13 @@ struct FastPass<'a> {
     shape: Vec<[f64; 3]>,
     /// Vertices of the garments, then those of the body.
     positions: Vec<[f64; 3]>,
-    /// What the body leaves to every vertex of the garments where it is.
+    /// The half-space that the body leaves to every vertex of the garments.
     planes: Vec<Option<Plane>>,
     /// Directions away from the body.
     outward: Vec<[f64; 3]>,
     /// Pairs of the input's garments with themselves, ascending.
     known_self_intersections: FacePairs,
-    /// Conditions that parted triangles so far: without them their neighbours would pull them in again.
+    /// Conditions that separated triangles so far: without them their neighbours would pull them in again.
     remembered: Vec<Contact>,
 }
 
@@ -169,7 +169,7 @@ impl<'a> FastPass<'a> {
             known_self_intersections,
             remembered,
         };
-        pass.known_self_intersections = pass.own().copied().collect();
+        pass.known_self_intersections = pass.self_pairs().copied().collect();
         pass
     }
 
@@ -222,7 +222,7 @@ impl<'a> FastPass<'a> {
         self.look_again(&before);
     }
 
-    /// Cloth gives back what it was strained by. Strict limits leave it.
+    /// Relaxes strain, unless limits are strict.
     fn relax_strain(&mut self, budget: &Budget) {
         if self.settings.loosened > 1.0 {
             let before = self.positions.clone();
@@ -258,18 +258,19 @@ impl<'a> FastPass<'a> {
     }
 
     /// Pairs that are left of garments with themselves.
-    fn own(&self) -> impl Iterator<Item = &(u32, u32)> {
-        self.filter.intersections.iter().filter(|pair| self.is_own(pair))
+    fn self_pairs(&self) -> impl Iterator<Item = &(u32, u32)> {
+        self.filter.intersections.iter().filter(|pair| self.is_self_pair(pair))
     }
 
     /// Pairs of garments with themselves that are to be parted.
     fn parted_self_intersections(&self) -> impl Iterator<Item = &(u32, u32)> {
         let is_known = |pair| self.known_self_intersections.binary_search(pair).is_ok();
         let is_asked = move |pair| mends_self_intersections(self.settings) || !is_known(pair);
-        self.own().filter(move |pair| is_asked(pair) && !(self.is_pinch(pair.0) && self.is_pinch(pair.1)))
+        self.self_pairs()
+            .filter(move |pair| is_asked(pair) && !(self.is_pinch(pair.0) && self.is_pinch(pair.1)))
     }
 
-    fn is_own(&self, &(f, g): &(u32, u32)) -> bool {
+    fn is_self_pair(&self, &(f, g): &(u32, u32)) -> bool {
         !self.filter.mesh.is_body(g) && self.outfit.garment_of_face(f) == self.outfit.garment_of_face(g)
     }
 
@@ -277,7 +278,7 @@ impl<'a> FastPass<'a> {
     fn parted(&self) -> impl Iterator<Item = &(u32, u32)> {
         let is_counted = |&&(f, g): &&(u32, u32)| match self.body_face(g) {
             Some(face) => !self.body.is_pinched(face),
-            None => !(self.is_own(&(f, g)) || self.is_pinch(f) && self.is_pinch(g)),
+            None => !(self.is_self_pair(&(f, g)) || self.is_pinch(f) && self.is_pinch(g)),
         };
         self.filter.intersections.iter().filter(is_counted)
     }

@@ -1,4 +1,4 @@
-//! One round: what crossings and wrong sides ask for, and the relaxation that meets it.
+//! One round: the conditions of intersections and of vertices on the wrong side, and the relaxation that meets them.
 
 use super::super::contact::{Contact, is_tiny, normal_of};
 use super::super::layer_constraint::{Order, order, part_along, part_from_body};
@@ -7,28 +7,28 @@ use super::super::self_intersections::part_self_intersections;
 use super::Untangling;
 use crate::vec3::{add, add_scaled, dot, norm, sub};
 
-/// No contact asks for a longer step than this in a round (m).
+/// Longest step that a condition asks for in a round (m).
 const LONGEST_STEP: f64 = 0.02;
 
 impl Untangling<'_> {
-    /// Parts what is crossed or on the wrong side, with its neighbourhood.
+    /// Separates what intersects or lies on the wrong side, with its neighbourhood.
     pub(super) fn step(&mut self, round: usize) {
         let gap = self.settings.gap * (1.0 + 0.1 * round as f64).min(3.0);
         let outfit = self.outfit;
-        let (mut asked, crumpled) = match self.sides {
+        let (mut asked, crumpled) = match self.orientation {
             None => self.part_self_intersections(0.25 * gap),
             Some(_) => (Vec::new(), self.folded()),
         };
         let mut seeds: Vec<u32> = asked.iter().flat_map(|c| c.vertices).chain(crumpled).collect();
-        for &(f, g) in &self.crossings.layers {
+        for &(f, g) in &self.intersections.layers {
             let (outer, inner) = (outfit.faces[f as usize], outfit.faces[g as usize]);
             seeds.extend(outer.iter().chain(&inner));
-            let has_side = self.sides.is_some_and(|sides| !sides.crossed(f, g));
-            if !has_side && let Order::Along(away) = order(outer, inner, true, &self.outward) {
+            let has_orientation = self.orientation.is_some_and(|orientation| !orientation.is_unknown(f, g));
+            if !has_orientation && let Order::Along(away) = order(outer, inner, true, &self.outward) {
                 part_along(away, outer, inner, &self.positions, 0.5 * gap, LONGEST_STEP, &mut asked);
             }
         }
-        for &(f, other) in &self.crossings.body {
+        for &(f, other) in &self.intersections.body {
             seeds.extend(outfit.faces[f as usize]);
             self.part_from_body(f, other, gap, &mut asked);
         }
@@ -61,11 +61,11 @@ impl Untangling<'_> {
                 contacts.push(Contact::vertex(v, &plane, plane.distance + step));
             }
         }
-        // But that cloth keeps its sides matters more: cloth that has gone through cloth would not come back.
-        let last = match self.sides {
+        // Contact orientation matters more than the body: cloth that has passed through cloth would not come back.
+        let last = match self.orientation {
             None => LastPasses::FEW,
-            Some(sides) => {
-                sides.contacts(&self.positions, &is_in, self.settings.gap, &mut contacts);
+            Some(orientation) => {
+                orientation.contacts(&self.positions, &is_in, self.settings.gap, &mut contacts);
                 LastPasses::ALL
             }
         };
@@ -75,13 +75,13 @@ impl Untangling<'_> {
         self.touch(&region);
     }
 
-    /// Vertices of faces that cross others of their garment.
+    /// Vertices of faces that intersect others of their garment.
     fn folded(&self) -> Vec<u32> {
-        let faces = self.crossings.own.iter().flat_map(|&(f, g)| [f, g]);
+        let faces = self.intersections.self_pairs.iter().flat_map(|&(f, g)| [f, g]);
         faces.flat_map(|f| self.outfit.faces[f as usize]).collect()
     }
 
-    /// Takes vertices back that went farther than allowed.
+    /// Limits the displacement of vertices.
     fn hold_back(&mut self, region: &[u32]) {
         for &v in region {
             let v = v as usize;
@@ -89,12 +89,12 @@ impl Untangling<'_> {
         }
     }
 
-    /// The part of a face over a face of the body has to come out of it.
+    /// The part of a face over a face of the body has to leave it.
     fn part_from_body(&self, f: u32, other: u32, gap: f64, found: &mut Vec<Contact>) {
         let face = self.outfit.faces[f as usize];
         let Some(lower) = self.body.tree.triangle(other).filter(|t| !is_tiny(t)) else { return };
         let normal = normal_of(&lower);
-        // A face on the other side of the limb asks for the way through it.
+        // A face on the other side of the limb would pull cloth through it.
         let away = face.iter().fold([0.0; 3], |sum, &v| add(sum, self.outward[v as usize]));
         let seen = face.iter().fold([0.0; 3], |sum, &v| {
             add(sum, self.planes[v as usize].filter(|p| p.distance > 0.0).map_or([0.0; 3], |p| p.normal))
@@ -105,10 +105,10 @@ impl Untangling<'_> {
         part_from_body(face, &self.positions, &lower, (0.5 * gap, LONGEST_STEP), found);
     }
 
-    /// Conditions that part crossings of garments with themselves, and crumpled vertices, which are smoothed.
+    /// Conditions that part intersections of garments with themselves, and crumpled vertices, which are smoothed.
     fn part_self_intersections(&mut self, gap: f64) -> (Vec<Contact>, Vec<u32>) {
         let (mut contacts, mut folded) = (Vec::new(), Vec::new());
-        for &(f, g) in &self.crossings.own {
+        for &(f, g) in &self.intersections.self_pairs {
             let (one, other) = (self.outfit.faces[f as usize], self.outfit.faces[g as usize]);
             match order(one, other, false, &self.outward) {
                 Order::Along(away) => {

@@ -23,7 +23,7 @@ fn dressed<R>(meshes: &[TriMesh], with: impl FnOnce(&Outfit<'_>, Vec<[f64; 3]>) 
     with(&Outfit::new(&layers), meshes.iter().flat_map(TriMesh::positions).copied().collect())
 }
 
-fn crossings(outfit: &Outfit<'_>, positions: &[[f64; 3]]) -> usize {
+fn intersections(outfit: &Outfit<'_>, positions: &[[f64; 3]]) -> usize {
     let [lower, upper] = [0, 1].map(|g| (outfit.part(positions, g), outfit.layers[g].garment.faces()));
     triangle_pairs(lower.0, lower.1, upper.0, upper.1).len()
 }
@@ -41,13 +41,13 @@ fn enforced(contacts: &[Contact], positions: &mut [[f64; 3]], may_move: &[bool])
     }
 }
 
-/// Whichever way the sheets lie, and wherever small moves take their vertices: what keeps their sides takes them apart again.
+/// Whichever way the sheets lie, and wherever small moves take their vertices: what keeps their orientation takes them apart again.
 #[test]
 fn sheets_that_were_pushed_through_each_other_come_back_to_the_side_they_were_on() {
     for gap in [1e-3, -1e-3, 4e-3] {
         dressed(&sheets(gap), |outfit, before| {
-            let sides = Sides::of(outfit, &before, None);
-            assert_eq!(crossings(outfit, &before), 0);
+            let orientation = ContactOrientation::of(outfit, &before, None);
+            assert_eq!(intersections(outfit, &before), 0);
             let mut random = SplitMix::new(7);
             let mut positions = before.clone();
             for (v, p) in positions.iter_mut().enumerate() {
@@ -58,10 +58,10 @@ fn sheets_that_were_pushed_through_each_other_come_back_to_the_side_they_were_on
             let may_move = vec![true; positions.len()];
             for _ in 0..20 {
                 let mut contacts = Vec::new();
-                sides.contacts(&positions, &may_move, 1e-3, &mut contacts);
+                orientation.contacts(&positions, &may_move, 1e-3, &mut contacts);
                 enforced(&contacts, &mut positions, &may_move);
             }
-            assert_eq!(crossings(outfit, &positions), 0);
+            assert_eq!(intersections(outfit, &positions), 0);
             let height = |g: usize| {
                 let part = outfit.part(&positions, g);
                 part.iter().map(|p| p[2]).sum::<f64>() / part.len() as f64
@@ -74,14 +74,14 @@ fn sheets_that_were_pushed_through_each_other_come_back_to_the_side_they_were_on
 #[test]
 fn nothing_is_asked_of_what_is_far_or_held() {
     dressed(&sheets(2.0 * WATCH), |outfit, before| {
-        let sides = Sides::of(outfit, &before, None);
-        assert!(sides.vertices.is_empty() && sides.edges.is_empty());
+        let orientation = ContactOrientation::of(outfit, &before, None);
+        assert!(orientation.vertices.is_empty() && orientation.edges.is_empty());
     });
     dressed(&sheets(4e-4), |outfit, before| {
-        let sides = Sides::of(outfit, &before, None);
+        let orientation = ContactOrientation::of(outfit, &before, None);
         let asked = |is_in: bool| {
             let mut contacts = Vec::new();
-            sides.contacts(&before, &vec![is_in; before.len()], 1e-3, &mut contacts);
+            orientation.contacts(&before, &vec![is_in; before.len()], 1e-3, &mut contacts);
             contacts
         };
         assert!(asked(false).is_empty());
@@ -97,23 +97,27 @@ fn nothing_is_asked_of_what_is_far_or_held() {
 }
 
 #[test]
-fn faces_that_cross_have_no_sides() {
+fn faces_that_intersect_have_no_sides() {
     let tilted = |mesh: &TriMesh| shapes::mapped(mesh, |[x, y, z]| [x, y, z + 0.2 * (x - 0.05)]);
     let [lower, upper] = sheets(0.0);
     dressed(&[lower, tilted(&upper)], |outfit, before| {
-        let sides = Sides::of(outfit, &before, None);
-        let crossed = TriangleTree::new(&before, &outfit.faces).self_pairs();
-        assert!(crossed.len() > 10);
-        for (f, g) in crossed {
-            assert!(sides.crossed(f, g) && sides.crossed(g, f));
+        let orientation = ContactOrientation::of(outfit, &before, None);
+        let intersected = TriangleTree::new(&before, &outfit.faces).self_pairs();
+        assert!(intersected.len() > 10);
+        for (f, g) in intersected {
+            assert!(orientation.is_unknown(f, g) && orientation.is_unknown(g, f));
             let (f, g) = (outfit.faces[f as usize], outfit.faces[g as usize]);
-            assert!(!sides.vertices.iter().any(|s| s.face == g && f.contains(&s.vertex)));
+            assert!(!orientation.vertices.iter().any(|s| s.face == g && f.contains(&s.vertex)));
             let is_of = |edge: &[u32; 2], face: [u32; 3]| edges_of(face).contains(edge);
-            assert!(!sides.edges.iter().any(|s| is_of(&s.edges[0], f) && is_of(&s.edges[1], g)));
+            assert!(!orientation.edges.iter().any(|s| is_of(&s.edges[0], f) && is_of(&s.edges[1], g)));
         }
         // Away from where they cross, every vertex near the other sheet knows its side.
-        assert!(sides.vertices.iter().any(|s| s.side > 0.0) && sides.vertices.iter().any(|s| s.side < 0.0));
-        let heights = sides.vertices.iter().filter(|s| s.vertex as usize >= outfit.part(&before, 0).len());
+        assert!(
+            orientation.vertices.iter().any(|s| s.side > 0.0)
+                && orientation.vertices.iter().any(|s| s.side < 0.0)
+        );
+        let heights =
+            orientation.vertices.iter().filter(|s| s.vertex as usize >= outfit.part(&before, 0).len());
         for s in heights.filter(|s| s.gap > 1e-9) {
             let is_over = before[s.vertex as usize][0] > 0.05;
             let looks_up = before[s.face[0] as usize][2] == 0.0;
@@ -122,28 +126,29 @@ fn faces_that_cross_have_no_sides() {
     });
 }
 
-/// Some vertices of a sheet go through another one: what was told before brings them back; without that they have no side.
+/// Some vertices of a sheet go through another one: what was before_orientation before brings them back; without that they have no side.
 #[test]
-fn what_crosses_keeps_the_side_it_had_before() {
+fn what_intersects_keeps_the_side_it_had_before() {
     let gap = 2e-3;
     dressed(&sheets(gap), |outfit, before| {
-        let told = Sides::of(outfit, &before, None);
+        let before_orientation = ContactOrientation::of(outfit, &before, None);
         let upper = outfit.part(&before, 0).len();
         let mut through = before.clone();
         let is_in_the_middle = |p: &[f64; 3]| p[..2].iter().all(|x| (x - 0.05).abs() < 0.008);
         for p in through[upper..].iter_mut().filter(|p| is_in_the_middle(p)) {
             p[2] -= 1.2 * gap;
         }
-        let crossed = crossings(outfit, &through);
-        assert!(crossed > 10);
-        let unknown = Sides::of(outfit, &through, None);
-        let known = Sides::of(outfit, &through, Some(&told));
+        let intersected = intersections(outfit, &through);
+        assert!(intersected > 10);
+        let unknown = ContactOrientation::of(outfit, &through, None);
+        let known = ContactOrientation::of(outfit, &through, Some(&before_orientation));
         // And so on from step to step.
-        let known = Sides::of(outfit, &through, Some(&known));
-        assert!(known.crossed.is_empty() && unknown.crossed.len() == 2 * crossed);
-        let over = |sides: &Sides| {
-            let is_up = |of: &&OfVertex| of.vertex as usize >= upper && before[of.face[0] as usize][2] == 0.0;
-            sides.vertices.iter().filter(is_up).filter(|of| of.side > 0.0).count()
+        let known = ContactOrientation::of(outfit, &through, Some(&known));
+        assert!(known.not_oriented.is_empty() && unknown.not_oriented.len() == 2 * intersected);
+        let over = |orientation: &ContactOrientation| {
+            let is_up =
+                |of: &&VertexOverFace| of.vertex as usize >= upper && before[of.face[0] as usize][2] == 0.0;
+            orientation.vertices.iter().filter(is_up).filter(|of| of.side > 0.0).count()
         };
         assert!(over(&known) > over(&unknown));
         let mut positions = through.clone();
@@ -152,7 +157,7 @@ fn what_crosses_keeps_the_side_it_had_before() {
             known.contacts(&positions, &vec![true; before.len()], 1e-3, &mut contacts);
             enforced(&contacts, &mut positions, &vec![true; before.len()]);
         }
-        assert_eq!(crossings(outfit, &positions), 0);
+        assert_eq!(intersections(outfit, &positions), 0);
     });
 }
 

@@ -1,10 +1,10 @@
-//! Which side of each other sheets of cloth lie on, told where nothing crosses, and what keeps them there.
+//! Contact orientation: on which side of each other near elements of cloth lie in a state, and the conditions that keep them there.
 //!
-//! Deep in a crease of the body many sheets lie over each other, and no direction away from the body says which belongs where:
-//! the nearest body point may be on either side. Where nothing crosses there is no need to ask. A step later every
-//! vertex is still to be on the side of the faces near it where it was before, and every edge on the side of the edges near it:
-//! the two ways in which triangles can begin to cross. What crosses all the same keeps the side it had before: on the way on it
-//! can still go back.
+//! Deep in a crease of the body many sheets lie over each other, and no outward direction orders them: the nearest body point may
+//! be on either side. A state without intersections needs no order: after a short step every vertex has to be on the same side
+//! of the faces near it as before, and every edge on the same side of the edges near it, the two ways in which triangles can
+//! begin to intersect. Elements of triangles that intersect all the same keep the side they had before, so that a later step
+//! can separate them.
 
 use std::collections::HashSet;
 
@@ -15,50 +15,50 @@ use super::outfit::Outfit;
 use crate::contact::TriangleTree;
 use crate::vec3::{cross, dot, norm_squared, scale, sub};
 
-/// What is nearer than this (m) may meet in a step.
+/// Elements nearer than this (m) may meet in a step.
 const WATCH: f64 = 0.006;
-/// How far beyond a face or an edge, as a share of it, what lies beside it may slide over it in a step.
+/// How far beyond a face or an edge an element may lie and still slide over it in a step, as a share of the face or edge.
 const BESIDE: f64 = 0.25;
-/// Edges with a smaller sine between them have no side of each other.
+/// Edges with a smaller sine between them have no orientation.
 const PARALLEL: f64 = 0.1;
-/// What is kept of the distance between two sheets, as shares of the gap: no less and no more than this.
+/// Least and largest distance that a condition keeps, as shares of the gap.
 const KEPT: (f64, f64) = (0.1, 0.5);
 
-/// Sides of everything that was near each other in a state of an outfit.
-pub(super) struct Sides {
-    vertices: Vec<OfVertex>,
-    edges: Vec<OfEdges>,
-    /// Faces that crossed there, either way round, and had no sides before either.
-    crossed: HashSet<(u32, u32)>,
+/// The sides of all near vertex–face and edge–edge pairs in a state of an outfit.
+pub(super) struct ContactOrientation {
+    vertices: Vec<VertexOverFace>,
+    edges: Vec<EdgePastEdge>,
+    /// Intersecting faces without orientation, in both orders.
+    not_oriented: HashSet<(u32, u32)>,
 }
 
 /// A vertex over (`side` 1) or under (−1) a face.
 #[derive(Clone, Copy)]
-struct OfVertex {
+struct VertexOverFace {
     vertex: u32,
     face: [u32; 3],
     side: f64,
-    /// How far from it (m).
+    /// Distance (m).
     gap: f64,
 }
 
 /// An edge on the side of another one to which the cross product of the two points (`side` 1), or on the other (−1).
 #[derive(Clone, Copy)]
-struct OfEdges {
+struct EdgePastEdge {
     edges: [[u32; 2]; 2],
     side: f64,
-    /// How far apart (m).
+    /// Distance (m).
     gap: f64,
 }
 
-impl Sides {
-    /// Sides of `outfit` at `positions`. Two faces that cross there have those that they had `before`, or none.
+impl ContactOrientation {
+    /// The orientation of `outfit` at `positions`. Intersecting faces keep the one they had `before`, or have none.
     pub fn of(outfit: &Outfit<'_>, positions: &[[f64; 3]], before: Option<&Self>) -> Self {
         let tree = TriangleTree::new(positions, &outfit.faces);
         let edges = Edges::of(outfit);
-        let crossings = tree.self_pairs();
-        let unknown = Pairs::crossing(&outfit.faces, &crossings);
-        let mut vertices: Vec<OfVertex> = (0..positions.len() as u32)
+        let intersections = tree.self_pairs();
+        let unknown = Pairs::of_faces(&outfit.faces, &intersections);
+        let mut vertices: Vec<VertexOverFace> = (0..positions.len() as u32)
             .into_par_iter()
             .with_min_len(64)
             .flat_map_iter(|v| {
@@ -71,7 +71,7 @@ impl Sides {
                             return None;
                         }
                         let (side, gap) = (height.signum(), height.abs());
-                        (gap < WATCH).then_some(OfVertex { vertex: v, face, side, gap })
+                        (gap < WATCH).then_some(VertexOverFace { vertex: v, face, side, gap })
                     })
                     .collect::<Vec<_>>()
             })
@@ -94,38 +94,41 @@ impl Sides {
                         return None;
                     }
                     let (side, gap) = (height.signum(), height.abs());
-                    (gap < WATCH).then_some(OfEdges { edges, side, gap })
+                    (gap < WATCH).then_some(EdgePastEdge { edges, side, gap })
                 })
                 .collect::<Vec<_>>()
         };
-        let mut edges: Vec<OfEdges> =
+        let mut edges: Vec<EdgePastEdge> =
             (0..edges.all.len() as u32).into_par_iter().with_min_len(64).flat_map_iter(near_edge).collect();
-        // Of what crosses only that is told.
+        // Intersecting pairs have only their earlier orientation.
         let (first_vertex, first_edge) = (vertices.len(), edges.len());
         if let Some(before) = before {
-            let is_unknown = |of: &&OfVertex| unknown.vertices.contains(&(of.vertex, of.face));
+            let is_unknown = |of: &&VertexOverFace| unknown.vertices.contains(&(of.vertex, of.face));
             vertices.extend(before.vertices.iter().filter(is_unknown));
-            let is_unknown = |of: &&OfEdges| unknown.edges.contains(&of.edges);
+            let is_unknown = |of: &&EdgePastEdge| unknown.edges.contains(&of.edges);
             edges.extend(before.edges.iter().filter(is_unknown));
         }
-        let told = Pairs::told(&vertices[first_vertex..], &edges[first_edge..]);
-        let crosses_untold =
-            |&(f, g): &(u32, u32)| !told.include(outfit.faces[f as usize], outfit.faces[g as usize]);
-        let crossed =
-            crossings.into_iter().filter(crosses_untold).flat_map(|(f, g)| [(f, g), (g, f)]).collect();
-        Self { vertices, edges, crossed }
+        let oriented = Pairs::oriented(&vertices[first_vertex..], &edges[first_edge..]);
+        let has_no_orientation =
+            |&(f, g): &(u32, u32)| !oriented.include(outfit.faces[f as usize], outfit.faces[g as usize]);
+        let not_oriented = intersections
+            .into_iter()
+            .filter(has_no_orientation)
+            .flat_map(|(f, g)| [(f, g), (g, f)])
+            .collect();
+        Self { vertices, edges, not_oriented }
     }
 
-    /// Whether two faces have no side of each other because they crossed before any was told.
-    pub fn crossed(&self, f: u32, g: u32) -> bool {
-        self.crossed.contains(&(f, g))
+    /// Whether two faces intersect and have no orientation.
+    pub fn is_unknown(&self, f: u32, g: u32) -> bool {
+        self.not_oriented.contains(&(f, g))
     }
 
-    /// What keeps all sides of which a vertex `is_in`, at `positions` on the way: to be enforced within a step.
+    /// Conditions at `positions`, within a step, that keep the side of every pair with a vertex that `is_in`.
     pub fn contacts(&self, positions: &[[f64; 3]], is_in: &[bool], gap: f64, found: &mut Vec<Contact>) {
         let (least, most) = (KEPT.0 * gap, KEPT.1 * gap);
         let may_move = |vertices: &[u32]| vertices.iter().any(|&v| is_in[v as usize]);
-        for OfVertex { vertex, face, side, gap } in &self.vertices {
+        for VertexOverFace { vertex, face, side, gap } in &self.vertices {
             if !(may_move(&[*vertex]) || may_move(face)) {
                 continue;
             }
@@ -135,7 +138,7 @@ impl Sides {
                 found.push(Contact::vertex_over(*vertex, (*face, at), scale(normal, *side), gap));
             }
         }
-        for OfEdges { edges, side, gap } in &self.edges {
+        for EdgePastEdge { edges, side, gap } in &self.edges {
             if !may_move(edges.as_flattened()) {
                 continue;
             }
@@ -171,18 +174,18 @@ fn edges_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)])
 }
 
-/// Vertices and faces, edges and edges: what sides may be told of.
+/// Vertex–face and edge–edge pairs.
 struct Pairs {
     vertices: HashSet<(u32, [u32; 3])>,
-    /// Either way round.
+    /// In both orders.
     edges: HashSet<[[u32; 2]; 2]>,
 }
 
 impl Pairs {
-    /// Of faces that cross.
-    fn crossing(faces: &[[u32; 3]], crossings: &[(u32, u32)]) -> Self {
+    /// All pairs of intersecting faces.
+    fn of_faces(faces: &[[u32; 3]], intersections: &[(u32, u32)]) -> Self {
         let (mut vertices, mut edges) = (HashSet::new(), HashSet::new());
-        for &(f, g) in crossings {
+        for &(f, g) in intersections {
             let (f, g) = (faces[f as usize], faces[g as usize]);
             vertices.extend(f.map(|v| (v, g)).into_iter().chain(g.map(|v| (v, f))));
             for one in edges_of(f) {
@@ -192,16 +195,16 @@ impl Pairs {
         Self { vertices, edges }
     }
 
-    /// Of which a side is told.
-    fn told(vertices: &[OfVertex], edges: &[OfEdges]) -> Self {
-        let both_ways = |of: &OfEdges| [of.edges, [of.edges[1], of.edges[0]]];
+    /// The pairs that have a side.
+    fn oriented(vertices: &[VertexOverFace], edges: &[EdgePastEdge]) -> Self {
+        let both_ways = |of: &EdgePastEdge| [of.edges, [of.edges[1], of.edges[0]]];
         Self {
             vertices: vertices.iter().map(|of| (of.vertex, of.face)).collect(),
             edges: edges.iter().flat_map(both_ways).collect(),
         }
     }
 
-    /// Whether there are any of two faces.
+    /// Whether any pair belongs to two faces.
     fn include(&self, one: [u32; 3], other: [u32; 3]) -> bool {
         let has_vertex = |f: [u32; 3], g| f.iter().any(|&v| self.vertices.contains(&(v, g)));
         let has_edge = |a: &[u32; 2]| edges_of(other).iter().any(|b| self.edges.contains(&[*a, *b]));
@@ -216,21 +219,21 @@ fn faces_near<'a>(tree: &'a TriangleTree<'_>, [a, b]: [[f64; 3]; 2]) -> impl Ite
     tree.faces_in_box(low, high)
 }
 
-/// Whether an edge joins one of `some` to one of `others`: beside each other in one sheet they have no side.
+/// Whether an edge joins one of `some` to one of `others`: neighbours in one sheet have no orientation.
 fn are_joined(outfit: &Outfit<'_>, some: &[u32], others: &[u32]) -> bool {
     some.iter().any(|&v| outfit.ring(v).any(|n| others.contains(&n)))
 }
 
-/// Where a vertex is, seen from a face.
+/// A vertex in the frame of a face.
 struct Over {
-    /// Its place in the face, straight below it.
+    /// Barycentric coordinates of its projection.
     at: [f64; 3],
     normal: [f64; 3],
     /// Over the face along its normal (m).
     height: f64,
 }
 
-/// None where the vertex is not over the face, or the face has no normal.
+/// None if the vertex does not project into the face, or the face has no normal.
 fn over(positions: &[[f64; 3]], vertex: u32, face: [u32; 3]) -> Option<Over> {
     let (p, corners) = (positions[vertex as usize], face.map(|v| positions[v as usize]));
     if is_tiny(&corners) {
@@ -246,9 +249,9 @@ fn over(positions: &[[f64; 3]], vertex: u32, face: [u32; 3]) -> Option<Over> {
     is_over.then(|| Over { at, normal, height: dot(normal, sub(p, corners[0])) })
 }
 
-/// Where two edges pass each other.
+/// The closest points of the lines of two edges.
 struct Past {
-    /// Places on each of them, 0–1.
+    /// Coordinates on each edge, 0–1.
     at: [f64; 2],
     /// Along the cross product of the two.
     normal: [f64; 3],
@@ -256,7 +259,7 @@ struct Past {
     height: f64,
 }
 
-/// None where they do not pass each other, or are about parallel.
+/// None if the closest points lie outside the edges, or the edges are about parallel.
 fn past(positions: &[[f64; 3]], edges: [[u32; 2]; 2]) -> Option<Past> {
     let [[p, q], [r, s]] = edges.map(|edge| edge.map(|v| positions[v as usize]));
     let (first, second, between) = (sub(q, p), sub(s, r), sub(r, p));

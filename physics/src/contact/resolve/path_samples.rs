@@ -1,39 +1,38 @@
-//! The stages of a path: none is made twice, and they end with the drape that is to be resolved.
+//! A cache of a path's samples, which ends with the drape that is to be resolved. A step that is halved asks for the same
+//! samples again.
 //!
-//! A step that is halved comes by the same places again.
-//!
-//! The drape at the end may be more than what is known of the stages: a solver may have refined it. What it differs by from the
-//! stage at 1 is faded in along the path, in the frames of the skinning transforms.
+//! The drape at the end may differ from the sample at 1: a solver may have refined it. The difference is faded in along the path,
+//! in the frames of the skinning transforms.
 
 use super::{Layer, PathSample};
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add_scaled, sub};
 
-/// Stages kept: some megabytes each.
+/// Samples in the cache: some megabytes each.
 const MOST: usize = 64;
 
-/// Stages by their share of the path; the last one, and the others that were used last, are kept.
-pub(super) struct Stages<'a> {
+/// Samples by their share of the path: the end, and the most recently used others.
+pub(super) struct PathSamples<'a> {
     end: &'a [Layer<'a>],
-    /// None before a stage was asked for.
+    /// None before the first request.
     last: Option<Last>,
     kept: Vec<(f64, PathSample)>,
 }
 
 /// The end of the path.
 struct Last {
-    stage: PathSample,
-    /// What the drape there differs by from what is known of the stages, in the frames of all vertices.
+    sample: PathSample,
+    /// The drape minus the sample, in the frames of all vertices (m).
     difference: Vec<[f64; 3]>,
 }
 
-impl<'a> Stages<'a> {
-    /// Those of a path to the drape `end`.
+impl<'a> PathSamples<'a> {
+    /// For a path to the drape `end`.
     pub fn to(end: &'a [Layer<'a>]) -> Self {
         Self { end, last: None, kept: Vec::new() }
     }
 
-    /// The stage at `share`, `made` where it is not known.
+    /// The sample at `share`, `made` if it is not cached.
     pub fn at<E>(
         &mut self,
         share: f64,
@@ -47,37 +46,37 @@ impl<'a> Stages<'a> {
             }
         };
         if share == 1.0 {
-            return Ok(last.stage.clone());
+            return Ok(last.sample.clone());
         }
         let entry = match self.kept.iter().position(|(known, _)| *known == share) {
             Some(i) => self.kept.remove(i),
             None => (share, last.faded_in(share, made(share)?)),
         };
-        let stage = entry.1.clone();
+        let sample = entry.1.clone();
         if self.kept.len() == MOST {
             self.kept.remove(0);
         }
         self.kept.push(entry);
-        Ok(stage)
+        Ok(sample)
     }
 }
 
 impl Last {
-    /// Of the drape `end`, on what is known of the stage there.
-    fn of(mut stage: PathSample, end: &[Layer<'_>]) -> Self {
-        let pairs = end.iter().zip(&stage.draped).flat_map(|(end, draped)| end.positions.iter().zip(draped));
+    /// The drape `end` in place of the one in `sample`.
+    fn of(mut sample: PathSample, end: &[Layer<'_>]) -> Self {
+        let pairs = end.iter().zip(&sample.draped).flat_map(|(end, draped)| end.positions.iter().zip(draped));
         let in_frame = |((p, q), transform): ((&[f64; 3], &[f64; 3]), _)| into_frame(transform, sub(*p, *q));
-        let difference = pairs.zip(&stage.transforms).map(in_frame).collect();
-        stage.draped = end.iter().map(|layer| layer.positions.to_vec()).collect();
-        Self { stage, difference }
+        let difference = pairs.zip(&sample.transforms).map(in_frame).collect();
+        sample.draped = end.iter().map(|layer| layer.positions.to_vec()).collect();
+        Self { sample, difference }
     }
 
-    fn faded_in(&self, share: f64, mut stage: PathSample) -> PathSample {
-        let difference = self.difference.iter().zip(&stage.transforms);
-        for (p, (offset, transform)) in stage.draped.iter_mut().flatten().zip(difference) {
+    fn faded_in(&self, share: f64, mut sample: PathSample) -> PathSample {
+        let difference = self.difference.iter().zip(&sample.transforms);
+        for (p, (offset, transform)) in sample.draped.iter_mut().flatten().zip(difference) {
             *p = add_scaled(*p, share, out_of_frame(transform, *offset));
         }
-        stage
+        sample
     }
 }
 
@@ -90,7 +89,7 @@ mod tests {
     use crate::vec3::distance_squared;
     use std::sync::Arc;
 
-    /// A stage where cloth at rest has been turned about the vertical by `angle`.
+    /// A sample where cloth at rest has been turned about the vertical by `angle`.
     fn turned(rest: &[[f64; 3]], angle: f64) -> PathSample {
         let (s, c) = angle.sin_cos();
         let turn = |[x, y, z]: [f64; 3]| [c * x + s * z, y, c * z - s * x];
@@ -102,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_drape_at_the_end_has_more_grows_along_the_way_and_turns_with_the_body() {
+    fn the_difference_of_the_end_grows_along_the_path_and_turns_with_the_body() {
         let mesh = shapes::grid(0.2, 0.1, 5, 4);
         let garment = RestGarment::new(&mesh);
         let rest = mesh.positions();
@@ -112,28 +111,28 @@ mod tests {
             .map(|p| add_scaled(*p, 0.01, [1.5_f64.cos(), 0.0, -1.5_f64.sin()]))
             .collect();
         let layers = [Layer { garment: &garment, positions: &end }];
-        let mut stages = Stages::to(&layers);
+        let mut samples = PathSamples::to(&layers);
         for share in [0.0, 0.5, 1.0] {
-            let stage = stages.at(share, |share| Ok::<_, ()>(turned(rest, 1.5 * share))).unwrap();
+            let sample = samples.at(share, |share| Ok::<_, ()>(turned(rest, 1.5 * share))).unwrap();
             let moved: Vec<[f64; 3]> = rest.iter().map(|p| [p[0] + 0.01 * share, p[1], p[2]]).collect();
-            for (p, q) in stage.draped[0].iter().zip(&turned(&moved, 1.5 * share).draped[0]) {
+            for (p, q) in sample.draped[0].iter().zip(&turned(&moved, 1.5 * share).draped[0]) {
                 assert!(distance_squared(*p, *q) < 1e-24, "at {share}: {p:?} {q:?}");
             }
         }
-        let last = stages.at(1.0, |_| Err("is known")).unwrap();
+        let last = samples.at(1.0, |_| Err("is known")).unwrap();
         assert_eq!(last.draped[0], end, "to the last bit");
     }
 
     #[test]
-    fn a_stage_is_made_once_while_it_is_among_the_last() {
-        let mut stages = Stages::to(&[]);
+    fn a_sample_is_made_once_while_it_is_cached() {
+        let mut samples = PathSamples::to(&[]);
         let mut made = Vec::new();
         let mut ask = |share: f64| {
-            let stage = stages.at(share, |share| {
+            let sample = samples.at(share, |share| {
                 made.push(share);
                 Ok::<_, ()>(turned(&[[1.0; 3]], share))
             });
-            assert_eq!(stage.unwrap().draped.len(), usize::from(share != 1.0));
+            assert_eq!(sample.unwrap().draped.len(), usize::from(share != 1.0));
         };
         let early = |i: usize| i as f64 / MOST as f64;
         (0..MOST).for_each(|i| ask(early(i)));
@@ -142,13 +141,13 @@ mod tests {
         let expected: Vec<f64> =
             [1.0].into_iter().chain((0..MOST).map(early)).chain([0.999, early(1)]).collect();
         assert_eq!(made, expected);
-        assert_eq!(stages.kept.len(), MOST);
+        assert_eq!(samples.kept.len(), MOST);
     }
 
     #[test]
-    fn what_cannot_be_made_is_not_kept() {
-        let mut stages = Stages::to(&[]);
-        assert_eq!(stages.at(0.5, |_| Err("no")).err(), Some("no"));
-        assert!(stages.kept.is_empty() && stages.last.is_none());
+    fn a_failed_sample_is_not_cached() {
+        let mut samples = PathSamples::to(&[]);
+        assert_eq!(samples.at(0.5, |_| Err("no")).err(), Some("no"));
+        assert!(samples.kept.is_empty() && samples.last.is_none());
     }
 }
