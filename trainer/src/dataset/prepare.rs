@@ -13,7 +13,7 @@ use clothcombo_data::asset::Body;
 use clothcombo_model::{Graph, OutfitTensors, Packing};
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneGarment, SceneLayers};
 use clothcombo_physics::query::Surface;
-use clothcombo_physics::transform::Transform;
+use clothcombo_physics::transform::{self, Transform};
 use std::sync::Arc;
 
 /// One body of a prepared scene, with the garments' state on it; garments are packed inner → outer.
@@ -57,6 +57,13 @@ impl PreparedScene {
     /// Initial skinning of every vertex on the first body, canonical → posed, `[ΣV]`.
     pub fn skinning_transforms(&self) -> Vec<Transform> {
         skinning_transforms(&self.garments, &self.bodies[0].bones)
+    }
+
+    /// Linear blend skinning of the start state on the first body (m), `[ΣV]`, by its `transforms`
+    /// ([`skinning_transforms`](Self::skinning_transforms)).
+    pub fn skinned_start(&self, transforms: &[Transform]) -> Vec<[f64; 3]> {
+        let start = self.bodies[0].start.iter().map(|p| p.map(f64::from));
+        transforms.iter().zip(start).map(|(t, p)| transform::apply(t, p)).collect()
     }
 
     /// The energy on `body` of every garment by itself, what is worn below it being part of the body.

@@ -149,7 +149,7 @@ impl Evaluation {
         let evaluator = Evaluator {
             model,
             networks: &networks,
-            post_process: PostProcessor::new(model, &networks),
+            post_process: PostProcessor::new(model),
             settings: ResolveSettings { steps: counts.continuation_steps, ..ResolveSettings::default() },
             ablations,
             specific,

@@ -2,8 +2,6 @@
 
 use super::ModelUnderTest;
 use crate::dataset::PreparedScene;
-use crate::inference::layer_interaction::LayerInteraction;
-use crate::inference::networks::Networks;
 use crate::inference::tensor_store::DrapeError;
 use clothcombo_data::asset::{Garment, infeasible_pair};
 use clothcombo_physics::contact::resolve::{
@@ -28,17 +26,16 @@ pub enum PostProcessError {
     Resolve(#[from] ResolveError),
 }
 
-/// What the post-process needs besides a drape: the data, who drapes other poses, and constants of garments.
+/// What the post-process needs besides a drape: the data, and constants of garments.
 pub struct PostProcessor<'a> {
     model: &'a ModelUnderTest,
-    networks: &'a Networks<'a>,
     known: Mutex<HashMap<usize, Arc<RestGarment>>>,
 }
 
 impl<'a> PostProcessor<'a> {
-    /// For scenes of `model`, draped by its `networks`.
-    pub fn new(model: &'a ModelUnderTest, networks: &'a Networks<'a>) -> Self {
-        Self { model, networks, known: Mutex::default() }
+    /// For scenes of `model`.
+    pub fn new(model: &'a ModelUnderTest) -> Self {
+        Self { model, known: Mutex::default() }
     }
 
     /// A drape of `scene` from the packed positions of all garments on its first body.
@@ -58,19 +55,18 @@ impl<'a> PostProcessor<'a> {
         }
     }
 
-    /// `scene` in a pose between the T-pose and its own, draped by the forward pass alone: that leaves fewer intersections
-    /// than the accepted state (docs/resolve.md).
+    /// `scene` in a pose between the T-pose and its own, garments skinned: that leaves fewer intersections than the networks
+    /// (docs/resolve.md).
     fn path_sample(&self, scene: &PreparedScene, share: f64) -> Result<PathSample, PostProcessError> {
         let mut sample = scene.sample.clone();
         for body in &mut sample.bodies {
             body.pose = body.pose.scaled_keeping_heading(share);
         }
         let scene = self.model.prepare(&sample).map_err(DrapeError::from)?;
-        Ok(PathSample {
-            body: Arc::new(scene.exact_body()),
-            draped: wide(&scene, &self.networks.forward(&scene, LayerInteraction::Together)?.posed),
-            transforms: scene.skinning_transforms(),
-        })
+        let transforms = scene.skinning_transforms();
+        let skinned = scene.skinned_start(&transforms);
+        let draped = scene.parts(&skinned).into_iter().map(<[_]>::to_vec).collect();
+        Ok(PathSample { body: Arc::new(scene.exact_body()), draped, transforms })
     }
 }
 

@@ -1,12 +1,12 @@
 //! One drape: networks, post-process, refinement.
 
 use super::motion::RetryPolicy;
-use super::network_drape::{NetworkDrape, Pass};
+use super::network_drape::NetworkDrape;
 use super::{
     BodyState, Certificate, Drape, Draper, DraperError, GarmentDrape, Outfit, RefineSteps, elapsed, refine,
 };
 use crate::inference::reference::ReferenceScene;
-use clothcombo_physics::contact::resolve::{PathSample, Resolved, resolve_after, resolve_along};
+use clothcombo_physics::contact::resolve::{Resolved, resolve_after, resolve_along};
 use clothcombo_physics::vec3::{add_scaled, sub};
 use std::time::Instant;
 
@@ -62,17 +62,17 @@ impl Draper {
         let (positions, resolved, refinement) = match frame.refine {
             RefineSteps::AtMost(0) => (resolved, None, None),
             steps => {
-                let mut energy = ReferenceScene::new(&self.trained.config.losses, &made.scene)?.energy;
-                energy.body = made.surface.clone();
-                let energy = energy.pulled_back(&made.transforms);
+                let mut energy = ReferenceScene::new(&self.trained.config.losses, &made.start.scene)?.energy;
+                energy.body = made.start.surface.clone();
+                let energy = energy.pulled_back(&made.start.transforms);
                 let (refined, done) = refine(&energy, &resolved.concat(), steps)?;
                 (outfit.to_parts(&refined), Some(resolved), Some(done))
             }
         };
         milliseconds.refine = elapsed(clock);
 
-        let [skinned, network] = [&made.skinned, &made.network].map(|packed| outfit.split(packed));
-        let transforms = outfit.split(&made.transforms);
+        let [skinned, network] = [&made.start.skinned, &made.network].map(|packed| outfit.split(packed));
+        let transforms = outfit.split(&made.start.transforms);
         let mut resolved = resolved.into_iter().flatten();
         let garments = positions.into_iter().enumerate().map(|(g, positions)| GarmentDrape {
             skinned: skinned[g].to_vec(),
@@ -83,13 +83,13 @@ impl Draper {
             resolve_ms: times[g],
         });
         let mut drape = Drape {
-            body: made.surface.positions.clone(),
-            heading: made.heading,
+            body: made.start.surface.positions.clone(),
+            heading: made.start.heading,
             garments: garments.collect(),
             milliseconds,
             refinement,
             certificate,
-            surface: Some(made.surface),
+            surface: Some(made.start.surface),
         };
         let clock = Instant::now();
         drape.settle(self, outfit)?;
@@ -105,23 +105,20 @@ impl Draper {
         made: &NetworkDrape,
         watch: &mut dyn FnMut(f64),
     ) -> Result<Resolved, DraperError> {
-        let (surface, settings) = (&*made.surface, &self.settings.post_process);
+        let (surface, settings) = (&*made.start.surface, &self.settings.post_process);
         let layers = outfit.layers(&outfit.split(&made.network));
+        // Another pose on a path; the surface is given for the end only.
+        let at = |pose, place| BodyState { shape: body.shape.clone(), pose, surface: None, place };
         let mut carried = None;
         if let Some(PreviousFrame { body: state, drape, retry }) = last {
             let between = |share: f64| {
                 watch(share);
                 match share {
-                    1.0 => Ok(made.sample(outfit)),
+                    1.0 => Ok::<_, DraperError>(made.sample(outfit)),
                     _ => {
                         let place = add_scaled(state.place, share, sub(body.place, state.place));
-                        self.path_sample(
-                            Pass::Accepted,
-                            outfit,
-                            body,
-                            state.pose.between(&body.pose, share),
-                            place,
-                        )
+                        let between = at(state.pose.between(&body.pose, share), place);
+                        Ok(self.network_drape(outfit, &between)?.sample(outfit))
                     }
                 }
             };
@@ -132,12 +129,12 @@ impl Draper {
         }
         let from_t_pose = |share: f64| {
             watch(share);
-            let pose = body.pose.scaled_keeping_heading(share);
-            let sample = self.path_sample(Pass::ForwardPass, outfit, body, pose, body.place)?;
             Ok::<_, DraperError>(match share {
-                // The surface is known here only.
-                1.0 => PathSample { draped: sample.draped, ..made.sample(outfit) },
-                _ => sample,
+                1.0 => made.start.sample(outfit),
+                _ => {
+                    let body = at(body.pose.scaled_keeping_heading(share), body.place);
+                    self.skinned_outfit(outfit, &body)?.sample(outfit)
+                }
             })
         };
         let anew = resolve_along(surface, &layers, settings, from_t_pose)?;

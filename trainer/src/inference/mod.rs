@@ -80,7 +80,6 @@ use clothcombo_model::ClothCombo;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use embedded::EmbeddedGarments;
 use frame::Frame;
-use network_drape::Pass;
 use shape_space::ShapeSpace;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -230,7 +229,7 @@ impl Draper {
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
     pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, DraperError> {
-        let made = self.network_drape(Pass::Accepted, outfit, body)?;
+        let made = self.network_drape(outfit, body)?;
         let refine = self.refine_steps(1);
         self.drape_frame(outfit, Frame { body, refine, last: None }, made, &mut |_| ())
     }

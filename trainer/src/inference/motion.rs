@@ -1,7 +1,6 @@
 //! A motion: each frame carries on from the one before, and what that leaves over from the one after.
 
 use super::frame::{Frame, PreviousFrame};
-use super::network_drape::Pass;
 use super::temporal_filter::TemporalFilter;
 use super::{BodyState, Certificate, Drape, Draper, DraperError, Outfit};
 
@@ -90,7 +89,7 @@ impl Draper {
                 let last = PreviousFrame { body: &bodies[frame + 1], drape: after, retry: RetryPolicy::ALL };
                 let mut watch = |share| progress(DrapeProgress::Continuation(share));
                 let body = &bodies[frame];
-                let mut made = self.network_drape(Pass::Accepted, outfit, body)?;
+                let mut made = self.network_drape(outfit, body)?;
                 made.network = own.garments.iter().flat_map(|garment| &garment.network).copied().collect();
                 let mut again =
                     self.drape_frame(outfit, Frame { body, refine, last: Some(last) }, made, &mut watch)?;

@@ -1,33 +1,56 @@
-//! What the networks make of an outfit on one body, brought to where the body stands.
+//! An outfit on one body, skinned and draped by the networks, brought to where the body stands.
 
 use super::{BodyState, Draper, DraperError, Outfit, PhaseTimes, elapsed};
 use crate::dataset::{BodySample, PreparedScene, SceneBuilder, SceneSample};
 use crate::inference::layer_interaction::LayerInteraction;
-use crate::inference::networks::{NetworkTimes, drape_on, forward_on};
+use crate::inference::networks::drape_on;
 use crate::inference::on_body::OnBody;
 use crate::inference::tensor_store::body_tensors;
+use clothcombo_data::asset::PosedBody;
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
-use clothcombo_data::asset::{Pose, PosedBody};
 use clothcombo_physics::contact::resolve::PathSample;
 use clothcombo_physics::query::Surface;
-use clothcombo_physics::transform::{self, Transform};
+use clothcombo_physics::transform::Transform;
 use clothcombo_physics::vec3::add;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// An outfit on one body before any post-process; garments packed inner → outer.
-pub(super) struct NetworkDrape {
-    /// The scene the networks saw: the body facing +z, at the origin.
+/// An outfit skinned on one body; garments packed inner → outer.
+pub(super) struct SkinnedOutfit {
+    /// The scene that networks see: the body facing +z, at the origin.
     pub scene: PreparedScene,
     /// The body where it stands.
     pub surface: Arc<Surface<f64>>,
     /// Where it faces: angle about the vertical from +z towards +x (radians).
     pub heading: f64,
+    /// By how much the scene is turned to face there (radians).
+    yaw: f64,
     /// Blended skinning transform of every vertex, canonical → posed.
     pub transforms: Vec<Transform>,
     /// Linear blend skinning of the start state (m).
     pub skinned: Vec<[f64; 3]>,
-    /// What the networks made of it (m).
+}
+
+impl SkinnedOutfit {
+    /// A sample of the continuation path from the T-pose.
+    pub fn sample(&self, outfit: &Outfit) -> PathSample {
+        self.sample_of(outfit, &self.skinned)
+    }
+
+    fn sample_of(&self, outfit: &Outfit, packed: &[[f64; 3]]) -> PathSample {
+        PathSample {
+            body: self.surface.clone(),
+            draped: outfit.to_parts(packed),
+            transforms: self.transforms.clone(),
+        }
+    }
+}
+
+/// An outfit on one body before any post-process; garments packed inner → outer.
+pub(super) struct NetworkDrape {
+    /// The outfit before the networks.
+    pub start: SkinnedOutfit,
+    /// Positions after the networks (m).
     pub network: Vec<[f64; 3]>,
     /// Time for the body and the networks (ms).
     pub milliseconds: PhaseTimes,
@@ -37,35 +60,19 @@ pub(super) struct NetworkDrape {
 const MOST_SHAPE: f64 = 20.0;
 
 impl NetworkDrape {
-    /// It as a sample of a continuation path.
+    /// A sample of the continuation path from one frame of a motion to the next.
     pub fn sample(&self, outfit: &Outfit) -> PathSample {
-        PathSample {
-            body: self.surface.clone(),
-            draped: outfit.to_parts(&self.network),
-            transforms: self.transforms.clone(),
-        }
+        self.start.sample_of(outfit, &self.network)
     }
 }
 
-/// How much of the networks is asked.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Pass {
-    /// The forward pass, judged beside skinning.
-    Accepted,
-    /// The forward pass alone: for samples of the continuation path from the T-pose, that leaves fewer intersections
-    /// (docs/resolve.md).
-    ForwardPass,
-}
-
 impl Draper {
-    /// Poses the body and lets the networks drape `outfit` on it.
-    pub(super) fn network_drape(
+    /// Poses the body and skins `outfit` on it.
+    pub(super) fn skinned_outfit(
         &self,
-        pass: Pass,
         outfit: &Outfit,
         body: &BodyState,
-    ) -> Result<NetworkDrape, DraperError> {
-        let clock = Instant::now();
+    ) -> Result<SkinnedOutfit, DraperError> {
         let (shape, posed) = self.posed(body)?;
         let mut surface = match &body.surface {
             Some(given) => self.checked_surface(given)?.to_vec(),
@@ -79,27 +86,31 @@ impl Draper {
             false => (body.pose.clone(), 0.0),
         };
         let scene = self.scene(outfit, BodySample { shape, pose: facing });
+        // The body may be turned about the vertical: the scene turns with it.
+        let turn = matrix_from_axis_angle([0.0, yaw, 0.0]);
+        let transforms: Vec<Transform> =
+            scene.skinning_transforms().iter().map(|t| turned(&turn, t, body.place)).collect();
+        let skinned = scene.skinned_start(&transforms);
+        Ok(SkinnedOutfit { scene, surface, heading, yaw, transforms, skinned })
+    }
+
+    /// Poses the body and lets the networks drape `outfit` on it.
+    pub(super) fn network_drape(
+        &self,
+        outfit: &Outfit,
+        body: &BodyState,
+    ) -> Result<NetworkDrape, DraperError> {
+        let clock = Instant::now();
+        let skinned = self.skinned_outfit(outfit, body)?;
+        let scene = &skinned.scene;
         let (tensors, start) = body_tensors(&scene.bodies[0], &self.dimensions(), &self.settings.device)?;
         let posing = elapsed(clock);
 
         let (outfit_tensors, embeddings) = (&outfit.tensors, &outfit.embeddings);
-        let on_body = OnBody { scene: &scene, outfit: outfit_tensors, embeddings, body: &tensors, start };
-        let clock = Instant::now();
-        let together = LayerInteraction::Together;
-        let (draped, times) = match pass {
-            Pass::Accepted => drape_on(&self.model, &on_body, together),
-            Pass::ForwardPass => {
-                let (_, draped) = forward_on(&self.model, &on_body, together);
-                (draped, NetworkTimes { forward: clock.elapsed(), ..NetworkTimes::default() })
-            }
-        };
+        let on_body = OnBody { scene, outfit: outfit_tensors, embeddings, body: &tensors, start };
+        let (draped, times) = drape_on(&self.model, &on_body, LayerInteraction::Together);
 
-        // The body may be turned about the vertical: what the networks made turns with it, to where everything else happens.
-        let turn = matrix_from_axis_angle([0.0, yaw, 0.0]);
-        let transforms: Vec<Transform> =
-            scene.skinning_transforms().iter().map(|t| turned(&turn, t, body.place)).collect();
-        let start = scene.bodies[0].start.iter().map(|p| p.map(f64::from));
-        let skinned = transforms.iter().zip(start).map(|(t, p)| transform::apply(t, p)).collect();
+        let turn = matrix_from_axis_angle([0.0, skinned.yaw, 0.0]);
         let network: Vec<[f64; 3]> =
             draped.posed.iter().map(|p| add(apply(&turn, p.map(f64::from)), body.place)).collect();
         outfit.check_finite(&network)?;
@@ -110,21 +121,7 @@ impl Draper {
             acceptance: ms(times.acceptance),
             ..PhaseTimes::default()
         };
-        Ok(NetworkDrape { scene, surface, heading, transforms, skinned, network, milliseconds })
-    }
-
-    /// The same in `pose` and place, a sample of the continuation path to `body`, for the post-process.
-    pub(super) fn path_sample(
-        &self,
-        pass: Pass,
-        outfit: &Outfit,
-        body: &BodyState,
-        pose: Pose,
-        place: [f64; 3],
-    ) -> Result<PathSample, DraperError> {
-        // A surface is known at the end only.
-        let sample = BodyState { shape: body.shape.clone(), pose, surface: None, place };
-        Ok(self.network_drape(pass, outfit, &sample)?.sample(outfit))
+        Ok(NetworkDrape { start: skinned, network, milliseconds })
     }
 
     /// What prepares scenes as the model was trained on them.

@@ -12,7 +12,6 @@ use clothcombo_physics::energy::{
 };
 use clothcombo_physics::mesh::Topology;
 use clothcombo_physics::query::Surface;
-use clothcombo_physics::transform::apply;
 use std::sync::Arc;
 
 /// A scene on its first body in f64, ready to be solved.
@@ -31,7 +30,6 @@ impl ReferenceScene {
     pub fn new(losses: &LossesConfig, scene: &PreparedScene) -> Result<Self, EnergyError> {
         let settings = losses.energy_settings().continuous();
         let body = &scene.bodies[0];
-        let start = wide(&body.start);
         let transforms = scene.skinning_transforms();
         let mut garments = Vec::new();
         for (garment, narrow) in scene.garments.iter().zip(&body.energy.garments) {
@@ -54,7 +52,7 @@ impl ReferenceScene {
         let body = Arc::new(Surface::new(wide(&surface.positions), surface.faces.clone()));
         Ok(Self {
             energy: SceneEnergy { body, garments, layers, settings }.continuous().pulled_back(&transforms),
-            skinned_start: transforms.iter().zip(&start).map(|(t, p)| apply(t, *p)).collect(),
+            skinned_start: scene.skinned_start(&transforms),
         })
     }
 }

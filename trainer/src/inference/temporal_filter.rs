@@ -3,7 +3,7 @@
 //! A network knows one pose at a time, and a proposal is taken or not: from frame to frame a drape may jump by a millimetre
 //! where the body hardly moves. What is averaged is as in [`super::smooth`]; the post-process comes after it.
 
-use super::network_drape::{NetworkDrape, Pass};
+use super::network_drape::NetworkDrape;
 use super::smooth::{averaged, binomial};
 use super::{BodyState, Draper, DraperError, Outfit};
 use clothcombo_physics::transform::{into_frame, out_of_frame};
@@ -37,7 +37,7 @@ impl<'a> TemporalFilter<'a> {
     fn make(&mut self) -> Result<(), DraperError> {
         let radius = self.weights.len() / 2;
         for frame in self.next + self.made.len()..self.bodies.len().min(self.next + radius + 1) {
-            let made = self.draper.network_drape(Pass::Accepted, self.outfit, &self.bodies[frame])?;
+            let made = self.draper.network_drape(self.outfit, &self.bodies[frame])?;
             if radius > 0 {
                 self.offsets.insert(frame, offsets(&made));
             }
@@ -58,7 +58,7 @@ impl Iterator for TemporalFilter<'_> {
         let mut made = self.made.pop_front()?;
         if !self.offsets.is_empty() {
             let mean = averaged(|other| &self.offsets[&other], self.bodies.len(), self.next, &self.weights);
-            let vertices = made.skinned.iter().zip(&made.transforms).zip(mean);
+            let vertices = made.start.skinned.iter().zip(&made.start.transforms).zip(mean);
             made.network = vertices.map(|((p, t), offset)| add(*p, out_of_frame(t, offset))).collect();
         }
         self.next += 1;
@@ -67,6 +67,6 @@ impl Iterator for TemporalFilter<'_> {
 }
 
 fn offsets(made: &NetworkDrape) -> Vec<[f64; 3]> {
-    let vertices = made.network.iter().zip(&made.skinned).zip(&made.transforms);
+    let vertices = made.network.iter().zip(&made.start.skinned).zip(&made.start.transforms);
     vertices.map(|((p, start), transform)| into_frame(transform, sub(*p, *start))).collect()
 }

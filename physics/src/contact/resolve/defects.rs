@@ -1,7 +1,10 @@
 //! Which of two states of an outfit is the better one.
 
-/// What is wrong with a state. Less is better, compared in the order of the fields.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+use std::cmp::Ordering;
+
+/// What is wrong with a state. A state without intersections is better than any other one; otherwise less excess strain counts
+/// first, since torn cloth shows more than intersections, then fewer intersections, narrow pairs and self-intersections.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Defects {
     /// Intersecting triangle pairs with the body and between garments; while garments are relaxed, all pairs and vertices on the
     /// wrong side.
@@ -12,4 +15,20 @@ pub struct Defects {
     pub excess_strain: usize,
     /// Intersecting triangle pairs of garments with themselves.
     pub self_intersections: usize,
+}
+
+impl Ord for Defects {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let rank = |d: &Self| {
+            let intersects = d.intersections + d.narrow > 0;
+            (intersects, d.excess_strain, d.intersections, d.narrow, d.self_intersections)
+        };
+        rank(self).cmp(&rank(other))
+    }
+}
+
+impl PartialOrd for Defects {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
 }

@@ -359,7 +359,7 @@ fn wrong_input_is_named() {
 }
 
 #[test]
-fn of_two_results_the_one_with_fewer_crossings_counts_and_the_work_of_both() {
+fn of_two_results_the_one_with_fewer_defects_counts_and_the_work_of_both() {
     let result = |body_triangle_pairs, narrow_triangle_pairs, layer_triangle_pairs, rounds| Resolved {
         certificate: Certificate {
             body_triangle_pairs,
@@ -371,12 +371,12 @@ fn of_two_results_the_one_with_fewer_crossings_counts_and_the_work_of_both() {
         steps: 3,
         ..Resolved::default()
     };
-    let torn = |strain| {
-        let mut torn = result(0, 0, 0, 0);
-        torn.certificate.strain_added = Some(strain);
-        torn
+    let strained = |mut of: Resolved, strain| {
+        of.certificate.strain_added = Some(strain);
+        of
     };
-    // Intersections come first, then narrow pairs, then torn cloth.
+    let torn = |strain| strained(result(0, 0, 0, 0), strain);
+    // A clear state comes first, then less excess strain, then intersections and narrow pairs.
     let (intersected, narrow, clear) = (result(8, 0, 0, 1), result(10, 10, 0, 2), result(0, 0, 0, 4));
     for (first, second, best) in [
         (&intersected, &narrow, &narrow),
@@ -389,6 +389,8 @@ fn of_two_results_the_one_with_fewer_crossings_counts_and_the_work_of_both() {
         // A little more strain is no reason to take another result.
         (&torn(0.4), &torn(0.1), &torn(0.4)),
         (&intersected, &torn(30.0), &torn(30.0)),
+        (&intersected, &strained(result(1, 0, 0, 0), 30.0), &intersected),
+        (&intersected, &strained(narrow.clone(), 0.4), &strained(narrow.clone(), 0.4)),
     ] {
         let found = first.clone().or(second.clone());
         assert_eq!(found.certificate, best.certificate);
