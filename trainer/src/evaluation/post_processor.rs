@@ -17,7 +17,7 @@ use thiserror::Error;
 /// Why a drape cannot be post-processed.
 #[derive(Debug, Error, Diagnostic)]
 pub enum PostProcessError {
-    /// A pose of the continuation path cannot be draped.
+    /// A pose of the continuation path cannot be prepared.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Drape(#[from] DrapeError),
@@ -97,7 +97,7 @@ impl DrapedScene<'_> {
     /// Resolves it, if need be on a continuation path from the T-pose.
     ///
     /// # Errors
-    /// When it is no valid scene, or another pose cannot be draped.
+    /// When it is no valid scene, or another pose cannot be prepared.
     pub fn resolved(&self, settings: &ResolveSettings) -> Result<Resolved, PostProcessError> {
         let sample_at = |share: f64| self.post_processor.path_sample(self.scene, share);
         resolve_along(&self.body, &self.layers(), settings, sample_at)

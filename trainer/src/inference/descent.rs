@@ -1,11 +1,11 @@
 //! Moves an outfit towards proposed states, garment by garment, only as far as that lowers its energy.
 //!
-//! A network may make worse what is unlike anything that it was trained on. The losses need no ground truth, so that
-//! this is seen at inference. A proposal is a new state of all garments; every garment goes a share of the distance
-//! there, the first of some with which *no garment's energy rises, nor the sum of those that pairs connect*. The energy of a garment
-//! is that of its own terms and of every pair it is part of: what it wins against a neighbour counts, and what that loses is its
-//! own to see. So the energy of every garment and that of the outfit fall or stay from state to state, and a garment
-//! that a proposal would harm does not keep those from moving that it has nothing to do with.
+//! A network may make worse what is unlike anything that it was trained on. The losses need no ground truth, so that this is seen
+//! at inference. A proposal is a new state of all garments; every garment goes a share of the distance there, the first of some
+//! with which *no garment's energy rises, nor the sum of those that pairs connect*. The energy of a garment is that of its own
+//! terms and of every pair it is part of: what it wins against a neighbour counts, and what that loses is its own to see. So the
+//! energy of every garment and that of the outfit fall or stay from state to state, and a garment that a proposal would harm does
+//! not keep those from moving that it has nothing to do with.
 
 use crate::inference::Draped;
 use clothcombo_physics::energy::{SceneEnergy, weighted};

@@ -43,7 +43,7 @@ pub enum DrapeProgress {
 impl Draper {
     /// Drapes `outfit` on each of `bodies`, the frames of a motion. What the networks make is averaged over `radius`
     /// frames to each side before the post-process; 0 takes each frame as it is. The post-process carries on from frame
-    /// to frame; where a frame is left with intersections or torn cloth, and the one after it with less and no intersections,
+    /// to frame; where a frame is left with intersections or excess strain, and the one after it with less and no intersections,
     /// it carries on backwards from that one as well. `progress` is called on the path to each frame, after it, and
     /// before each that is draped once more.
     ///
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn after_a_frame_with_flaws_crossings_are_allowed_but_no_growing_strain() {
+    fn after_a_frame_with_flaws_intersections_are_allowed_but_no_growing_strain() {
         for (certificate, at_first, after_intersections, after_strain) in [
             (left(0, 0.4), true, true, true),
             (left(0, -0.4), true, true, true),

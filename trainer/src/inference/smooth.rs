@@ -25,7 +25,7 @@ pub struct Smoothing {
     pub whole: usize,
     /// Frames that were smoothed in part.
     pub partly: usize,
-    /// Frames that were left as they were, because smoothing would have made intersections or torn cloth.
+    /// Frames that were left as they were, because smoothing would have made intersections or excess strain.
     pub left: usize,
 }
 

@@ -68,8 +68,8 @@ impl GivenGarment {
         self.path.as_deref().filter(|path| has_extension(path, "obj"))
     }
 
-    /// Texture coordinates (u to the right, v upwards) of the corners of the garment's faces `[F, 3, 2]`: those of the OBJ file it was
-    /// read from, if that has some and its vertices and faces are still the garment's.
+    /// Texture coordinates (u to the right, v upwards) of the corners of the garment's faces `[F, 3, 2]`: those of the OBJ file
+    /// it was read from, if that has some and its vertices and faces are still the garment's.
     pub fn texture(&self) -> Option<Vec<[[f32; 2]; 3]>> {
         let path = self.obj_path()?;
         let vertex_of = |follows: &Attachment| {
@@ -231,9 +231,10 @@ impl GarmentCatalog {
         Ok(source)
     }
 
-    /// The garment of a file or, where there is no such file, of that name. A named one from a file is fitted like any other
-    /// file where it does not lie on this body, it may have been made for another one, or where `hints` say where it belongs
-    /// ([`FitSettings::is_placed`]). Other hints are about how files are written: a named garment that lies on the body needs none.
+    /// The garment of a file or, where there is no such file, of that name. A named one from a file is fitted like any other file
+    /// where it does not lie on this body, it may have been made for another one, or where `hints` say where it belongs
+    /// ([`FitSettings::is_placed`]). Other hints are about how files are written: a named garment that lies on the body needs
+    /// none.
     ///
     /// # Errors
     /// Naming the file or the unknown name.

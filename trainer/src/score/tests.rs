@@ -123,7 +123,7 @@ fn a_lifted_body_intersects_the_sleeve_and_is_measured_in_millimetres() {
 }
 
 #[test]
-fn stray_vertices_of_the_body_change_nothing_and_its_own_crossings_are_apart() {
+fn stray_vertices_of_the_body_change_nothing_and_its_self_intersections_are_apart() {
     let (body, inner, _) = scene();
     let garments = [draped("a", &inner)];
     let plain = score(&body, &garments, ScoreDistance::NearestVertex).unwrap();

@@ -115,8 +115,8 @@ impl Resolved {
     }
 
     /// If few intersections are left on `body`, or only self-intersections, attempts that start from the result of the one
-    /// before: nearly untangled cloth is a better reference for shape and lengths than the drape. None if limits are strict
-    /// (`settings.loosened`).
+    /// before, or from the best one: nearly untangled cloth is a better reference for shape and lengths than the drape. None if
+    /// limits are strict (`settings.loosened`).
     pub(super) fn go_on(
         &mut self,
         body: &Surface<f64>,

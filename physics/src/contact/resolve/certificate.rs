@@ -36,8 +36,8 @@ pub struct Certificate {
     /// Rise of the strain energy by the post-process, as a share of the energy before; `None` where there was none before, or
     /// nothing was done.
     pub strain_added: Option<f64>,
-    /// Whether the post-process had spent its budget (`ResolveSettings::total_rounds`, `ResolveSettings::time`) when pairs with the
-    /// body or between garments were left.
+    /// Whether the post-process had spent its budget (`ResolveSettings::total_rounds`, `ResolveSettings::time`) when pairs with
+    /// the body or between garments were left.
     #[serde(default)]
     pub is_stopped: bool,
     /// Pairs where the body lies inside itself.

@@ -33,8 +33,8 @@ const LOOK_OUT: f64 = 1e-6;
 pub(super) struct Clearance {
     /// By which share where it does not lie inside itself, 0–1.
     pub share: f64,
-    /// Whether it also yields where it lies so deep inside itself, or at such a slant, that no surface faces it. Cloth that enters a
-    /// crease step by step needs that; cloth that is there already would only be drawn deeper.
+    /// Whether it also yields where it lies so deep inside itself, or at such a slant, that no surface faces it. Cloth that
+    /// enters a crease step by step needs that; cloth that is there already would only be drawn deeper.
     pub is_deep: bool,
 }
 
@@ -175,8 +175,8 @@ fn facing_surface(
     tree.faces_in_box(low, high).filter_map(faces_it).min_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
-/// How far from vertex `v` at `p`, inside another part, the nearest surface is that does not face the way of `n`: for a vertex that
-/// has just gone in at a slant, and has no surface straight behind it.
+/// How far from vertex `v` at `p`, inside another part, the nearest surface is that does not face the way of `n`: for a vertex
+/// that has just gone in at a slant, and has no surface straight behind it.
 fn nearest_facing(
     tree: &TriangleTree<'_>,
     faces: &[[u32; 3]],
@@ -262,8 +262,8 @@ mod tests {
         }
     }
 
-    /// Vertices that have just gone in at a slant have no surface straight behind them: the nearest one counts, so that they do not
-    /// yield all at once.
+    /// Vertices that have just gone in at a slant have no surface straight behind them: the nearest one counts, so that they do
+    /// not yield all at once.
     #[test]
     fn a_vertex_that_has_just_gone_in_yields_a_little() {
         let steps = |apart: f64| {

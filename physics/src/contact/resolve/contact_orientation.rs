@@ -1,4 +1,5 @@
-//! Contact orientation: on which side of each other near elements of cloth lie in a state, and the conditions that keep them there.
+//! Contact orientation: on which side of each other near elements of cloth lie in a state, and the conditions that keep them
+//! there.
 //!
 //! Deep in a crease of the body many sheets lie over each other, and no outward direction orders them: the nearest body point may
 //! be on either side. A state without intersections needs no order: after a short step every vertex has to be on the same side

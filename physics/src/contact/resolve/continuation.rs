@@ -1,8 +1,8 @@
 //! Continuation: garments go step by step from a pose in which their order is plain to one in which it is not.
 //!
-//! With bent limbs the drape alone does not say where cloth belongs: a knee has gone through a skirt, a sleeve through the side of
-//! the chest, and the nearest exit is the wrong one. In the T-pose none of that has happened. On a path from there each step is
-//! short: the resolved state moves on by skinning and by the change of the drape, intersections stay shallow, and the nearest
+//! With bent limbs the drape alone does not say where cloth belongs: a knee has gone through a skirt, a sleeve through the side
+//! of the chest, and the nearest exit is the wrong one. In the T-pose none of that has happened. On a path from there each step
+//! is short: the resolved state moves on by skinning and by the change of the drape, intersections stay shallow, and the nearest
 //! exit is right. A step that raises the number of intersections is halved.
 
 use super::attempt::{FEW, resolved_further, settled};
@@ -19,7 +19,7 @@ use crate::transform::Transform;
 use std::time::Instant;
 
 /// As [`super::resolve`]; if intersections of `layers` on `body` remain, the garments go along a path from the sample at 0, the
-/// T-pose, to the sample at 1, on `body`. The difference between `layers` and the drape there is added along the path.
+/// T-pose, to the sample at 1, on `body`. The difference between `layers` and the sample there is added along the path.
 ///
 /// # Errors
 /// Those of `sample_at` and of [`super::resolve`].
@@ -63,7 +63,7 @@ pub fn resolve_after<E: From<ResolveError>>(
     let carry_on = |body: &Body<'_>| {
         budget.count_body(preparing);
         let step_lengths =
-            if before.intersections == 0 { StepLengths::OF_FRAME } else { StepLengths::OF_CROSSED_FRAME };
+            if before.intersections == 0 { StepLengths::OF_FRAME } else { StepLengths::OF_INTERSECTED_FRAME };
         let path = Path { layers, end: body, settings, budget, step_lengths };
         let (followed, steps) =
             path.continue_from(before, |share| Ok::<_, E>(checked(sample_at(share)?, layers)?))?;

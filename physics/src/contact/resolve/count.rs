@@ -33,14 +33,14 @@ pub(super) fn certified_around(body: &Surface<f64>, layers: &[Layer<'_>]) -> Cer
     })
 }
 
-/// [`certified_around`] near a `body` that is prepared; where that gives way is as it was noted.
+/// [`certified_around`] near a `body` that is prepared; its yield is as it was noted.
 pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Certificate {
     let mut found = counted(body, layers);
     found.count_narrow(body);
     found
 }
 
-/// [`certificate`] without what depends on where the body gives way; `body` may know some of what is to be counted.
+/// [`certificate`] without what depends on where the body yields; `body` may know some of what is to be counted.
 pub(super) fn counted(body: &impl ReportBody, layers: &[Layer<'_>]) -> Certificate {
     let garments: Vec<ReportGarment<'_>> = layers
         .iter()

@@ -2,8 +2,9 @@
 
 use std::cmp::Ordering;
 
-/// What is wrong with a state. A state without intersections is better than any other one; otherwise less excess strain counts
-/// first, since torn cloth shows more than intersections, then fewer intersections, narrow pairs and self-intersections.
+/// What is wrong with a state. A state without intersections, narrow ones included, is better than any other one; otherwise less
+/// excess strain counts first, since it shows more than intersections, then fewer intersections, narrow pairs and
+/// self-intersections.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Defects {
     /// Intersecting triangle pairs with the body and between garments; while garments are relaxed, all pairs and vertices on the

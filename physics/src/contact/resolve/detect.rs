@@ -139,7 +139,7 @@ mod tests {
 
     /// Few or all of the vertices move each time: what is kept and what is found anew is what there is.
     #[test]
-    fn crossings_kept_up_to_date_are_all_intersections() {
+    fn updated_intersections_are_all_intersections() {
         let mut random = SplitMix::new(7);
         let ball = Surface::from_mesh(&shapes::icosphere(0.1, 2));
         let meshes = [9, 10, 11].map(|n| shapes::irregular_grid(0.1, 0.1, n, n, 0.2, n as u64));

@@ -1,4 +1,5 @@
-//! Broad phase: the part of the body that clothes can meet. Ten fingers are half of the body's triangles and far from a tight top.
+//! Broad phase: the part of the body that clothes can meet. Ten fingers are half of the body's triangles and far from a tight
+//! top.
 
 use crate::vec3::is_finite;
 use std::ops::Range;

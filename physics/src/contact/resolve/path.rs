@@ -190,12 +190,12 @@ impl Path<'_, '_> {
         let kept = KEPT.powf((step / FADING).min(1.0));
         let start = carried(&node.state, sample, kept);
         check(&sample.body, &placed(self.layers, &start)?)?;
-        let StepLengths { keeping, keeps_first, clearance, .. } = self.step_lengths;
+        let StepLengths { keeping, always_keeps, clearance, .. } = self.step_lengths;
         let before = node.yielded.as_ref().map(|steps| Before { steps, most: YIELD_PER_PATH * step });
         let layers = self.layers;
         Ok(at_sample(layers, sample, &start, (clearance, before), |obstacle, start| {
             let first =
-                (step > keeping || !keeps_first).then(|| untangled(obstacle, start, &settings, self.budget));
+                (step > keeping || !always_keeps).then(|| untangled(obstacle, start, &settings, self.budget));
             match first {
                 Some(found) if step > keeping || found.intersections == 0 => return found,
                 _ => (),

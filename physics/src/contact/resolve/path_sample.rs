@@ -5,12 +5,12 @@ use std::sync::Arc;
 use crate::query::Surface;
 use crate::transform::Transform;
 
-/// The body and the drape at one share of a continuation path.
+/// The body and the garments at one share of a continuation path, before they are resolved there.
 #[derive(Clone)]
 pub struct PathSample {
     /// The body.
     pub body: Arc<Surface<f64>>,
-    /// The drape on it, `[V, 3]` per garment (m).
+    /// The garments on it, `[V, 3]` each (m): skinned, or draped.
     pub draped: Vec<Vec<[f64; 3]>>,
     /// Skinning transforms of all vertices, garment after garment, from one and the same state.
     pub transforms: Vec<Transform>,

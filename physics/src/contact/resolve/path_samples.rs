@@ -1,8 +1,8 @@
 //! A cache of a path's samples, which ends with the drape that is to be resolved. A step that is halved asks for the same
 //! samples again.
 //!
-//! The drape at the end may differ from the sample at 1: a solver may have refined it. The difference is faded in along the path,
-//! in the frames of the skinning transforms.
+//! The drape at the end differs from the sample at 1, where garments are skinned. The difference is faded in along the path, in
+//! the frames of the skinning transforms.
 
 use super::{Layer, PathSample};
 use crate::transform::{into_frame, out_of_frame};

@@ -20,7 +20,7 @@ pub struct Resolved {
     /// Steps tried on a continuation path: from the T-pose, by [`super::resolve_along`] (0 if the drape needed no path), or from
     /// the frame before, by [`super::resolve_after`].
     pub steps: usize,
-    /// Rounds of detection and relaxation of all stages but the fast pass.
+    /// Rounds of detection and relaxation of all attempts but the fast pass.
     pub rounds: usize,
     /// Time to prepare the body.
     pub body_time: Duration,

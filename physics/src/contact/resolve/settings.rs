@@ -29,9 +29,9 @@ pub struct ResolveSettings {
     /// Longest that an edge should get, as a share of its length in the input. Default 1.15: cloth gives a little, and a place
     /// that asks for more is left and listed. Contacts come last in a round, so that single edges get longer.
     pub stretch: f64,
-    /// How many times wider both limits are in a second attempt, where intersections are left; its result is only taken if it ends
-    /// with none. Where few are left in the end, all is tried again from there and both limits are measured anew. Default 6; 1
-    /// for strict limits: no attempt begins where another one ended, and added strain is not relaxed.
+    /// How many times wider both limits are in a second attempt, where intersections are left; its result is only taken if it
+    /// ends with none. Where few are left in the end, all is tried again from there and both limits are measured anew. Default 6;
+    /// 1 for strict limits: no attempt begins where another one ended, and added strain is not relaxed.
     pub loosened: f64,
     /// Most steps on a path: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
     /// Default 128; 0: no path.

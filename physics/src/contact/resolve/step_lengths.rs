@@ -11,8 +11,8 @@ pub(super) struct StepLengths {
     pub shortest: f64,
     /// The longest one in which cloth may keep its contact orientation: little slides past in it.
     pub keeping: f64,
-    /// Whether that is tried first, and without orientation where it leaves intersections; or the other way round.
-    pub keeps_first: bool,
+    /// Whether short steps always keep it; otherwise they do where a step without it leaves intersections.
+    pub always_keeps: bool,
     /// Where the body yields.
     pub clearance: Clearance,
 }
@@ -23,7 +23,7 @@ impl StepLengths {
         longest: 1.0 / 4.0,
         shortest: 1.0 / 512.0,
         keeping: 1.0 / 32.0,
-        keeps_first: true,
+        always_keeps: true,
         clearance: Clearance::DEEP,
     };
     /// From one frame of a motion to the next.
@@ -31,9 +31,9 @@ impl StepLengths {
         longest: 1.0,
         shortest: 1.0 / 128.0,
         keeping: 1.0,
-        keeps_first: false,
+        always_keeps: false,
         clearance: Clearance::AMPLE,
     };
     /// The same from a frame that was not clear.
-    pub const OF_CROSSED_FRAME: Self = Self { shortest: 1.0 / 4.0, ..Self::OF_FRAME };
+    pub const OF_INTERSECTED_FRAME: Self = Self { shortest: 1.0 / 4.0, ..Self::OF_FRAME };
 }

@@ -1,8 +1,8 @@
 //! Strain relaxation: cloth that was stretched or compressed returns towards its rest lengths.
 //!
-//! Untangling keeps edge lengths only as far as contacts allow, and a stretch that one round needs may not be needed later. If the
-//! strain energy has risen in the end, small moves bring edges towards their rest lengths. Each move passes the step filter, so
-//! that it makes no intersection, and is taken if the energy falls.
+//! Untangling keeps edge lengths only as far as contacts allow, and a stretch that one round needs may not be needed later. If
+//! the strain energy has risen in the end, small moves bring edges towards their rest lengths. Each move passes the step filter,
+//! so that it makes no intersection, and is taken if the energy falls.
 
 use super::budget::Budget;
 use super::certificate::strain_joule;
@@ -36,8 +36,8 @@ impl Resolved {
     }
 
     /// Lowers the strain energy where it has risen from that of `layers`, by at most so many moves (`times`) of what was moved
-    /// before, none of which makes an intersection. Strict limits (`settings.loosened`) allow none of this, nor does a `budget` of which
-    /// the time is over.
+    /// before, none of which makes an intersection. Strict limits (`settings.loosened`) allow none of this, nor does a `budget`
+    /// of which the time is over.
     pub(super) fn relax_strain(
         &mut self,
         drawn: &BodyObstacle<'_>,

@@ -25,7 +25,7 @@ pub(super) struct ClearanceWithdrawal<'a, 'b> {
 }
 
 impl ClearanceWithdrawal<'_, '_> {
-    /// The result replaces `best` if it has fewer defects.
+    /// The result replaces `best` if it is better.
     pub fn improve(&self, best: &mut Resolved, settings: &ResolveSettings) {
         for share in GAPS {
             if best.certificate.narrow_triangle_pairs == 0 || self.budget.is_spent() {

@@ -41,7 +41,8 @@ fn enforced(contacts: &[Contact], positions: &mut [[f64; 3]], may_move: &[bool])
     }
 }
 
-/// Whichever way the sheets lie, and wherever small moves take their vertices: what keeps their orientation takes them apart again.
+/// Whichever way the sheets lie, and wherever small moves take their vertices: what keeps their orientation takes them apart
+/// again.
 #[test]
 fn sheets_that_were_pushed_through_each_other_come_back_to_the_side_they_were_on() {
     for gap in [1e-3, -1e-3, 4e-3] {
@@ -126,7 +127,8 @@ fn faces_that_intersect_have_no_sides() {
     });
 }
 
-/// Some vertices of a sheet go through another one: what was before_orientation before brings them back; without that they have no side.
+/// Some vertices of a sheet go through another one: what was before_orientation before brings them back; without that they have
+/// no side.
 #[test]
 fn what_intersects_keeps_the_side_it_had_before() {
     let gap = 2e-3;

@@ -24,7 +24,7 @@ fn rising(size: f64) -> (TriMesh, impl Fn(f64) -> Result<PathSample, ResolveErro
     (sheet, sample_at)
 }
 
-/// Where a way starts that has no intersecting yet.
+/// The start of a path, without intersections.
 fn untouched(sample: PathSample, positions: Vec<Vec<[f64; 3]>>) -> ContactState {
     let PathSample { draped, transforms, .. } = sample;
     ContactState { draped, positions, transforms, intersections: 0 }

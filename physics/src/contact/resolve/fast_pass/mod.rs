@@ -111,8 +111,8 @@ fn mends_self_intersections(settings: &ResolveSettings) -> bool {
     settings.self_contact && settings.loosened > 1.0
 }
 
-/// Whether nothing is left to relaxation: no intersection, at most `most_self_intersections` pairs of garments with themselves, no
-/// whole part on the wrong side, no excess strain.
+/// Whether nothing is left to relaxation: no intersection, at most `most_self_intersections` pairs of garments with themselves,
+/// no whole part on the wrong side, no excess strain.
 fn is_good(certificate: &Certificate, most_self_intersections: usize) -> bool {
     certificate.is_clear()
         && certificate.self_triangle_pairs <= most_self_intersections

@@ -116,8 +116,8 @@ impl<'a> Untangling<'a> {
         untangling
     }
 
-    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better. Where intersections are left, a second attempt
-    /// with wider limits is kept if it ends with none.
+    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better. Where intersections are left, a second
+    /// attempt with wider limits is kept if it ends with none.
     pub fn run(&mut self) {
         self.detect();
         self.known_self_intersections.clone_from(&self.intersections.self_pairs);
