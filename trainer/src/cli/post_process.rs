@@ -28,8 +28,8 @@ impl PostProcessArguments {
 pub fn stopped(certificate: &Certificate) -> Option<String> {
     certificate.is_stopped.then(|| {
         format!(
-            "stopped after its budget, {} pairs left; hint: another order of the garments, fewer of them, or a pose in which the \
-             body overlaps itself less",
+            "stopped after its budget, {} pairs left; hint: a longer --time-limit if there is one, another order of the garments, \
+             fewer of them, or a pose in which the body overlaps itself less",
             certificate.between()
         )
     })

@@ -67,7 +67,7 @@ pub enum DraperError {
     },
     /// A motion without the frame that is asked for.
     #[error("{of} has {count} frames, no frame {frame}")]
-    #[diagnostic(help("frames count from 0"))]
+    #[diagnostic(help("frames count from 0; a motion without any holds no poses: export it again"))]
     NoFrame {
         /// The motion.
         of: String,
