@@ -66,7 +66,7 @@ impl PreparedScene {
         transforms.iter().zip(start).map(|(t, p)| transform::apply(t, p)).collect()
     }
 
-    /// The energy on `body` of every garment by itself, what is worn below it being part of the body.
+    /// The energy on `body` of every garment by itself, those below it being part of the body.
     pub fn energy_of_singles(&self, body: &PreparedBody) -> SceneEnergy<f32> {
         let mut energy = body.energy.without_layers();
         if !self.thickness_below.is_empty() {

@@ -1,8 +1,7 @@
 //! The post-process of an evaluation's scenes.
 
 use super::ModelUnderTest;
-use crate::dataset::PreparedScene;
-use crate::inference::tensor_store::DrapeError;
+use crate::dataset::{DatasetError, PreparedScene};
 use clothcombo_data::asset::{Garment, infeasible_pair};
 use clothcombo_physics::contact::resolve::{
     Certificate, Layer, PathSample, ResolveError, ResolveSettings, Resolved, RestGarment, certify,
@@ -20,7 +19,7 @@ pub enum PostProcessError {
     /// A pose of the continuation path cannot be prepared.
     #[error(transparent)]
     #[diagnostic(transparent)]
-    Drape(#[from] DrapeError),
+    Dataset(#[from] DatasetError),
     /// The drape is no valid scene.
     #[error(transparent)]
     Resolve(#[from] ResolveError),
@@ -55,14 +54,13 @@ impl<'a> PostProcessor<'a> {
         }
     }
 
-    /// `scene` in a pose between the T-pose and its own, garments skinned: that leaves fewer intersections than the networks
-    /// (docs/resolve.md).
+    /// `scene` in a pose between the T-pose and its own, garments skinned (docs/resolve.md).
     fn path_sample(&self, scene: &PreparedScene, share: f64) -> Result<PathSample, PostProcessError> {
         let mut sample = scene.sample.clone();
         for body in &mut sample.bodies {
             body.pose = body.pose.scaled_keeping_heading(share);
         }
-        let scene = self.model.prepare(&sample).map_err(DrapeError::from)?;
+        let scene = self.model.prepare(&sample)?;
         let transforms = scene.skinning_transforms();
         let skinned = scene.skinned_start(&transforms);
         let draped = scene.parts(&skinned).into_iter().map(<[_]>::to_vec).collect();

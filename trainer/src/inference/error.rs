@@ -67,7 +67,7 @@ pub enum DraperError {
     },
     /// A motion without the frame that is asked for.
     #[error("{of} has {count} frames, no frame {frame}")]
-    #[diagnostic(help("frames count from 0; a motion without any holds no poses: export it again"))]
+    #[diagnostic(help("{}", if *count == 0 { "export it again with its poses" } else { "frames count from 0" }))]
     NoFrame {
         /// The motion.
         of: String,

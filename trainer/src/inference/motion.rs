@@ -184,10 +184,10 @@ mod tests {
         assert_eq!(asked, [(4, 2), (2, 3), (1, 4)]);
         assert_eq!(intersections(&frames), [5, 1, 0, 0, 0, 0, 7]);
         // So is excess strain, from a frame that has less of it.
-        let mut torn = [left(0, 2.0), left(0, 1.5), left(2, 0.0), left(0, 0.5)];
+        let mut strained = [left(0, 2.0), left(0, 1.5), left(2, 0.0), left(0, 0.5)];
         let mut asked = Vec::new();
         let found: Result<(), String> = carry_back(
-            &mut torn,
+            &mut strained,
             |frame| frame,
             |frame, own, _| {
                 asked.push(frame);

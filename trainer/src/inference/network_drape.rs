@@ -23,8 +23,8 @@ pub(super) struct SkinnedOutfit {
     pub surface: Arc<Surface<f64>>,
     /// Where it faces: angle about the vertical from +z towards +x (radians).
     pub heading: f64,
-    /// By how much the scene is turned to face there (radians).
-    yaw: f64,
+    /// Turns the scene to face there.
+    turn: Matrix3,
     /// Blended skinning transform of every vertex, canonical → posed.
     pub transforms: Vec<Transform>,
     /// Linear blend skinning of the start state (m).
@@ -91,7 +91,7 @@ impl Draper {
         let transforms: Vec<Transform> =
             scene.skinning_transforms().iter().map(|t| turned(&turn, t, body.place)).collect();
         let skinned = scene.skinned_start(&transforms);
-        Ok(SkinnedOutfit { scene, surface, heading, yaw, transforms, skinned })
+        Ok(SkinnedOutfit { scene, surface, heading, turn, transforms, skinned })
     }
 
     /// Poses the body and lets the networks drape `outfit` on it.
@@ -101,18 +101,19 @@ impl Draper {
         body: &BodyState,
     ) -> Result<NetworkDrape, DraperError> {
         let clock = Instant::now();
-        let skinned = self.skinned_outfit(outfit, body)?;
-        let scene = &skinned.scene;
-        let (tensors, start) = body_tensors(&scene.bodies[0], &self.dimensions(), &self.settings.device)?;
+        let start = self.skinned_outfit(outfit, body)?;
+        let scene = &start.scene;
+        let (tensors, start_tensor) =
+            body_tensors(&scene.bodies[0], &self.dimensions(), &self.settings.device)?;
         let posing = elapsed(clock);
 
         let (outfit_tensors, embeddings) = (&outfit.tensors, &outfit.embeddings);
-        let on_body = OnBody { scene, outfit: outfit_tensors, embeddings, body: &tensors, start };
+        let on_body =
+            OnBody { scene, outfit: outfit_tensors, embeddings, body: &tensors, start: start_tensor };
         let (draped, times) = drape_on(&self.model, &on_body, LayerInteraction::Together);
 
-        let turn = matrix_from_axis_angle([0.0, skinned.yaw, 0.0]);
-        let network: Vec<[f64; 3]> =
-            draped.posed.iter().map(|p| add(apply(&turn, p.map(f64::from)), body.place)).collect();
+        let turned = |p: &[f32; 3]| add(apply(&start.turn, p.map(f64::from)), body.place);
+        let network: Vec<[f64; 3]> = draped.posed.iter().map(turned).collect();
         outfit.check_finite(&network)?;
         let ms = |time: Duration| 1e3 * time.as_secs_f64();
         let milliseconds = PhaseTimes {
@@ -121,7 +122,7 @@ impl Draper {
             acceptance: ms(times.acceptance),
             ..PhaseTimes::default()
         };
-        Ok(NetworkDrape { start: skinned, network, milliseconds })
+        Ok(NetworkDrape { start, network, milliseconds })
     }
 
     /// What prepares scenes as the model was trained on them.

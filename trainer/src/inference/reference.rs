@@ -11,7 +11,6 @@ use clothcombo_physics::energy::{
     EnergyError, EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers,
 };
 use clothcombo_physics::mesh::Topology;
-use clothcombo_physics::query::Surface;
 use std::sync::Arc;
 
 /// A scene on its first body in f64, ready to be solved.
@@ -48,8 +47,7 @@ impl ReferenceScene {
         let layers = body.energy.layers.iter();
         let layers =
             layers.map(|l| SceneLayers { inner: l.inner, outer: l.outer, weights: l.weights }).collect();
-        let surface = &body.energy.body;
-        let body = Arc::new(Surface::new(wide(&surface.positions), surface.faces.clone()));
+        let body = Arc::new(scene.exact_body());
         Ok(Self {
             energy: SceneEnergy { body, garments, layers, settings }.continuous().pulled_back(&transforms),
             skinned_start: scene.skinned_start(&transforms),

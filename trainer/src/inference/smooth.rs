@@ -1,8 +1,8 @@
-//! Temporal smoothing of a motion that never makes an intersection nor tears cloth.
+//! Temporal smoothing of a motion that makes no intersection and no excess strain.
 //!
 //! What is smoothed is each vertex's offset from linear blend skinning in the frame of its own skinning transform, so that
 //! cloth that merely follows the body stays as it is. Every smoothed frame is counted exactly; where it intersects more than the
-//! frame as it was, or is torn more, less of the smoothing is applied, and none if need be.
+//! frame as it was, or has more excess strain, less of the smoothing is applied, and none if need be.
 
 use super::{Drape, Draper, DraperError, Outfit};
 use clothcombo_physics::transform::{into_frame, out_of_frame};

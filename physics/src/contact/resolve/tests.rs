@@ -42,6 +42,15 @@ fn brute_force_pairs(meshes: &[(&[[f64; 3]], &[[u32; 3]])]) -> usize {
     pairs
 }
 
+/// Every garment at its positions.
+pub(super) fn layers<'a>(
+    garments: &'a [RestGarment],
+    positions: impl IntoIterator<Item = &'a [[f64; 3]]>,
+) -> Vec<Layer<'a>> {
+    let pairs = garments.iter().zip(positions);
+    pairs.map(|(garment, positions)| Layer { garment, positions }).collect()
+}
+
 struct Scene {
     body: Surface<f64>,
     garments: Vec<RestGarment>,
@@ -49,20 +58,16 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(body: &TriMesh, worn: &[TriMesh]) -> Self {
+    fn new(body: &TriMesh, garments: &[TriMesh]) -> Self {
         Self {
             body: Surface::from_mesh(body),
-            garments: worn.iter().map(RestGarment::new).collect(),
-            positions: worn.iter().map(|g| g.positions().to_vec()).collect(),
+            garments: garments.iter().map(RestGarment::new).collect(),
+            positions: garments.iter().map(|g| g.positions().to_vec()).collect(),
         }
     }
 
     fn layers(&self) -> Vec<Layer<'_>> {
-        self.garments
-            .iter()
-            .zip(&self.positions)
-            .map(|(garment, positions)| Layer { garment, positions })
-            .collect()
+        layers(&self.garments, self.positions.iter().map(Vec::as_slice))
     }
 
     fn pairs(&self, positions: &[Vec<[f64; 3]>]) -> usize {
@@ -139,7 +144,7 @@ fn reversed_layers_change_places() {
     let trunk = shapes::icosphere(0.15, 3);
     let wide = moved(&shapes::tube(0.175, 0.2, 48, 16), [0.0, -0.1, 0.0]);
     let narrow = moved(&shapes::tube(0.165, 0.2, 44, 15), [0.0, -0.1, 0.0]);
-    // The narrow one is to be worn over the wide one: nothing intersects, but the order is wrong.
+    // The narrow one is to lie over the wide one: nothing intersects, but the order is wrong.
     let scene = Scene::new(&trunk, &[wide, narrow]);
     let before = certify(&scene.body, &scene.layers()).unwrap();
     assert!(before.is_clear() && before.order_violations > 0.9, "{before:?}");
@@ -231,7 +236,7 @@ fn nested_tubes_with_random_bulges_are_untangled() {
     for seed in 0..6 {
         let mut random = SplitMix::new(100 + seed);
         // Three tubes, each 4 mm over the one before, whose radii swing by up to 6 mm.
-        let worn: Vec<TriMesh> = (0..3)
+        let garments: Vec<TriMesh> = (0..3)
             .map(|layer| {
                 let tube =
                     moved(&shapes::tube(0.155 + 0.004 * f64::from(layer), 0.16, 52, 14), [0.0, -0.08, 0.0]);
@@ -247,7 +252,7 @@ fn nested_tubes_with_random_bulges_are_untangled() {
                 })
             })
             .collect();
-        let scene = Scene::new(&trunk, &worn);
+        let scene = Scene::new(&trunk, &garments);
         if scene.pairs(&scene.positions) > 0 {
             let done = scene.must_clear();
             assert!(done.garments.iter().all(|w| w.largest_move < 0.015), "{:?}", done.garments);
@@ -371,11 +376,11 @@ fn of_two_results_the_one_with_fewer_defects_counts_and_the_work_of_both() {
         steps: 3,
         ..Resolved::default()
     };
-    let strained = |mut of: Resolved, strain| {
+    let with_strain = |mut of: Resolved, strain| {
         of.certificate.strain_added = Some(strain);
         of
     };
-    let torn = |strain| strained(result(0, 0, 0, 0), strain);
+    let strained = |strain| with_strain(result(0, 0, 0, 0), strain);
     // A clear state comes first, then less excess strain, then intersections and narrow pairs.
     let (intersected, narrow, clear) = (result(8, 0, 0, 1), result(10, 10, 0, 2), result(0, 0, 0, 4));
     for (first, second, best) in [
@@ -384,13 +389,13 @@ fn of_two_results_the_one_with_fewer_defects_counts_and_the_work_of_both() {
         (&narrow, &clear, &clear),
         (&clear, &narrow, &clear),
         (&result(2, 2, 1, 0), &result(1, 0, 0, 0), &result(1, 0, 0, 0)),
-        (&torn(0.9), &narrow, &torn(0.9)),
-        (&torn(1.1), &torn(0.4), &torn(0.4)),
+        (&strained(0.9), &narrow, &strained(0.9)),
+        (&strained(1.1), &strained(0.4), &strained(0.4)),
         // A little more strain is no reason to take another result.
-        (&torn(0.4), &torn(0.1), &torn(0.4)),
-        (&intersected, &torn(30.0), &torn(30.0)),
-        (&intersected, &strained(result(1, 0, 0, 0), 30.0), &intersected),
-        (&intersected, &strained(narrow.clone(), 0.4), &strained(narrow.clone(), 0.4)),
+        (&strained(0.4), &strained(0.1), &strained(0.4)),
+        (&intersected, &strained(30.0), &strained(30.0)),
+        (&intersected, &with_strain(result(1, 0, 0, 0), 30.0), &intersected),
+        (&intersected, &with_strain(narrow.clone(), 0.4), &with_strain(narrow.clone(), 0.4)),
     ] {
         let found = first.clone().or(second.clone());
         assert_eq!(found.certificate, best.certificate);

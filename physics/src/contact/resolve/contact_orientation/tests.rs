@@ -1,4 +1,5 @@
-use super::super::{Layer, RestGarment};
+use super::super::RestGarment;
+use super::super::tests::layers;
 use super::*;
 use crate::contact::triangle_pairs;
 use crate::mesh::TriMesh;
@@ -15,11 +16,7 @@ fn sheets(gap: f64) -> [TriMesh; 2] {
 /// Calls `with` the outfit of meshes, and their positions one behind the other.
 fn dressed<R>(meshes: &[TriMesh], with: impl FnOnce(&Outfit<'_>, Vec<[f64; 3]>) -> R) -> R {
     let garments: Vec<RestGarment> = meshes.iter().map(RestGarment::new).collect();
-    let layers: Vec<Layer<'_>> = garments
-        .iter()
-        .zip(meshes)
-        .map(|(garment, mesh)| Layer { garment, positions: mesh.positions() })
-        .collect();
+    let layers = layers(&garments, meshes.iter().map(TriMesh::positions));
     with(&Outfit::new(&layers), meshes.iter().flat_map(TriMesh::positions).copied().collect())
 }
 

@@ -79,22 +79,22 @@ fn the_next_frame_carries_on_from_the_one_before() {
     let highest = alone.positions[0].iter().map(|p| p[1]).fold(0.0, f64::max);
     assert!(highest < 0.1, "{highest}");
 
-    let mut reached = untouched(sample_at(0.0).unwrap(), sample.draped.clone());
+    let mut state = untouched(sample_at(0.0).unwrap(), sample.draped.clone());
     let mut was_moved = false;
     for frame in 1..=10 {
         let [before, now] = [0.1 * f64::from(frame - 1), 0.1 * f64::from(frame)];
         let body = sample_at(now).unwrap().body;
         let between = |share: f64| sample_at(before + (now - before) * share);
-        let found = resolve_after(reached, &body, &layers, &settings, between).unwrap().unwrap();
+        let found = resolve_after(state, &body, &layers, &settings, between).unwrap().unwrap();
         assert!(found.certificate.is_clear() && found.steps >= 1, "frame {frame}");
         assert!(found.garments[0].time > Duration::ZERO, "frame {frame}");
         let moved = found.positions[0].iter().zip(layers[0].positions).filter(|(p, q)| p != q).count();
         assert_eq!(found.garments[0].moved, moved, "frame {frame}");
         was_moved |= moved > 0;
-        reached = untouched(sample_at(now).unwrap(), found.positions);
+        state = untouched(sample_at(now).unwrap(), found.positions);
     }
     assert!(was_moved);
-    is_over_the_knee(&reached.positions[0], &sheet, &sample.body);
+    is_over_the_knee(&state.positions[0], &sheet, &sample.body);
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Drapes that are slightly wrong, judged by all pairs of triangles.
 
+use super::super::garment::at;
+use super::super::tests::layers;
 use super::*;
 use crate::contact::resolve::{RestGarment, certify};
 use crate::mesh::TriMesh;
@@ -24,19 +26,10 @@ fn scene(random: &mut SplitMix, layers: usize, bulge: f64) -> (Surface<f64>, Vec
 
 fn passed(body: &Surface<f64>, meshes: &[TriMesh]) -> Option<Resolved> {
     let garments: Vec<RestGarment> = meshes.iter().map(RestGarment::new).collect();
-    let layers: Vec<Layer<'_>> = garments
-        .iter()
-        .zip(meshes)
-        .map(|(garment, mesh)| Layer { garment, positions: mesh.positions() })
-        .collect();
+    let layers = layers(&garments, meshes.iter().map(TriMesh::positions));
     let found = fast_pass(body, &layers, &ResolveSettings::default()).unwrap();
     if let Some(found) = &found {
-        let layers: Vec<Layer<'_>> = garments
-            .iter()
-            .zip(&found.positions)
-            .map(|(garment, positions)| Layer { garment, positions })
-            .collect();
-        let mut again = certify(body, &layers).unwrap();
+        let mut again = certify(body, &at(&layers, &found.positions)).unwrap();
         again.strain_added = found.certificate.strain_added;
         assert_eq!(again, found.certificate);
         assert!(again.is_clear());
