@@ -1,7 +1,7 @@
 //! The paths in a configuration: absolute in memory, written relative to the folder in which the run was started, so that a run
 //! resumes from any folder and its configuration can be handed on. What is read is looked for beside the configuration first.
 
-use super::Config;
+use super::run::Config;
 use std::path::{Path, PathBuf};
 
 /// The body that is no file.

@@ -1,6 +1,6 @@
 //! The JSON schema of a configuration, for editors and for reading.
 
-use super::Config;
+use super::run::Config;
 use super::sources::EXTENDS;
 use serde_json::json;
 

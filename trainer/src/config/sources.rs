@@ -1,6 +1,6 @@
 //! The texts that a configuration is made of, its own and those it extends, as one tree in which every value knows its place.
 
-use super::load::ConfigError;
+use super::error::ConfigError;
 use super::reworded::reworded;
 use miette::{NamedSource, SourceSpan};
 use std::ops::Range;

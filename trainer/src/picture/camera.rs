@@ -1,6 +1,6 @@
 //! Where the picture is taken from.
 
-use super::render::Figure;
+use super::figure::Figure;
 
 /// What is farther from the centre of the framed figure than this, in its radii, may be cut off.
 const NEARBY_IN_RADII: f64 = 1.25;

@@ -6,6 +6,7 @@
 //! is not finite, a face that names no vertex) is left out of the picture: a training run must not end because one
 //! of its samples is ugly.
 
+mod figure;
 mod outfits;
 mod palette;
 mod render;
@@ -18,9 +19,10 @@ pub mod camera;
 pub mod chart;
 
 pub use camera::{Camera, View};
+pub use figure::Figure;
 pub use outfits::{DressedRow, MeshSlices, draw_dressed};
 pub use palette::{BODY_COLOUR, LAYER_COLOURS, layer_colour};
-pub use render::{Figure, render, render_with_camera};
+pub use render::{render, render_with_camera};
 pub use save::{png_bytes, save_png};
 pub use sheet::{LegendEntry, Sheet, SheetRow};
 

@@ -4,8 +4,9 @@ use image::RgbImage;
 use rayon::prelude::*;
 
 use super::View;
+use super::figure::Figure;
 use super::palette::{BODY_COLOUR, layer_colour};
-use super::render::{Figure, render};
+use super::render::render;
 use super::sheet::{LegendEntry, Sheet, SheetRow};
 
 /// Width and height of one view (pixels).

@@ -11,6 +11,7 @@ use image::RgbImage;
 use rayon::prelude::*;
 
 use super::camera::{Camera, Projected, View};
+use super::figure::Figure;
 use super::shade::{Sample, Samples, shade};
 
 /// Bands rasterised in parallel; fixed, because rounding inside a triangle depends on the band's origin.
@@ -29,17 +30,6 @@ const FILL_BUDGET: f64 = 24.0;
 const REACH: f64 = 1000.0;
 /// In place of a vertex that is not drawn; no face refers to it.
 const NOWHERE: Projected = Projected { ndc: [0.0; 2], depth: 2.0 };
-
-/// A triangle mesh to draw.
-#[derive(Clone, Copy, Debug)]
-pub struct Figure<'a> {
-    /// Vertex positions (m). A vertex that is not finite, or very far off, leaves its faces out of the picture.
-    pub positions: &'a [[f64; 3]],
-    /// Vertex indices per face, counter-clockwise seen from outside. A face that names no vertex is left out.
-    pub faces: &'a [[u32; 3]],
-    /// Surface colour (sRGB); the back of the surface is drawn darker and greyer.
-    pub colour: [u8; 3],
-}
 
 /// Draws `figures` into a picture of `size` = [width, height] pixels, framing the first one (see [`Camera::framing`]).
 ///

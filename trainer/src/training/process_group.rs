@@ -96,7 +96,7 @@ impl ProcessGroup {
     /// When MPI does not start, or this build knows none and several processes were started.
     pub fn join() -> Result<Self, ProcessGroupError> {
         #[cfg(feature = "mpi")]
-        return Ok(Self { engine: Some(Engine::start()?) });
+        return Ok(Self { engine: Some(Engine::start().ok_or(ProcessGroupError::NotStarted)?) });
         #[cfg(not(feature = "mpi"))]
         match launched() {
             0 | 1 => Ok(Self::default()),
@@ -108,7 +108,7 @@ impl ProcessGroup {
     pub fn partition(&self) -> RankPartition {
         #[cfg(feature = "mpi")]
         if let Some(engine) = &self.engine {
-            return engine.partition();
+            return RankPartition { rank: engine.rank(), size: engine.size() };
         }
         RankPartition::WHOLE
     }

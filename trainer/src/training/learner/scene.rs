@@ -1,6 +1,6 @@
 //! Loss and gradients of one scene, and of several in parallel.
 
-use super::{StepInput, StepOutput, StepTimes, norm_of};
+use super::step::{StepInput, StepOutput, StepTimes, norm_of};
 use crate::config::{ClipScope, Trains};
 use crate::dataset::PreparedScene;
 use crate::inference::tensor_store::DrapeError;

@@ -1,6 +1,5 @@
 //! The collective operations over MPI.
 
-use super::{ProcessGroupError, RankPartition};
 use mpi::Threading;
 use mpi::collective::SystemOperation;
 use mpi::environment::Universe;
@@ -14,19 +13,25 @@ pub(super) struct Engine {
 }
 
 impl Engine {
-    pub(super) fn start() -> Result<Self, ProcessGroupError> {
+    /// `None` where MPI does not start.
+    pub(super) fn start() -> Option<Self> {
         // Other threads compute and read, but only this one exchanges anything.
-        let (universe, _) =
-            mpi::initialize_with_threading(Threading::Funneled).ok_or(ProcessGroupError::NotStarted)?;
-        Ok(Self { communicator: universe.world(), _universe: universe })
+        let (universe, _) = mpi::initialize_with_threading(Threading::Funneled)?;
+        Some(Self { communicator: universe.world(), _universe: universe })
     }
 
-    pub(super) fn partition(&self) -> RankPartition {
-        RankPartition { rank: self.communicator.rank() as usize, size: self.communicator.size() as usize }
+    /// Number of this process, from 0.
+    pub(super) fn rank(&self) -> usize {
+        self.communicator.rank() as usize
+    }
+
+    /// Number of processes.
+    pub(super) fn size(&self) -> usize {
+        self.communicator.size() as usize
     }
 
     pub(super) fn gather(&self, row: &[f64]) -> Vec<Vec<f64>> {
-        let mut all = vec![0.0; row.len() * self.partition().size];
+        let mut all = vec![0.0; row.len() * self.size()];
         self.communicator.all_gather_into(row, &mut all);
         all.chunks_exact(row.len().max(1)).map(<[f64]>::to_vec).collect()
     }
