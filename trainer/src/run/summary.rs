@@ -2,15 +2,17 @@
 
 use crate::config::{Config, load};
 use crate::dataset::ValidationGroup;
+use crate::picture::chart::median_of_last;
 use crate::run::checkpoint::{Checkpoint, CheckpointError};
+use crate::run::folder::RunDir;
 use crate::run::lock::RunLock;
-use crate::run::observer::best_so_far;
+use crate::run::observer::History;
 use crate::run::report::run_name;
 use crate::run::validation::{Method, ratio};
 use crate::system::paths::lossy;
 use serde::Serialize;
 use serde_json::Value;
-use std::io::{self, BufRead, BufReader};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// A run in a few numbers.
@@ -34,9 +36,9 @@ pub struct RunSummary {
     /// Median time of the last 100 logged steps (s).
     pub seconds_per_step: Option<f64>,
     /// Steps skipped because loss or gradient was not finite.
-    pub skipped: u64,
+    pub skipped: usize,
     /// Steps whose gradient norm was far above the usual one.
-    pub spikes: u64,
+    pub spikes: usize,
     /// Step of the best validation.
     pub best_step: Option<u64>,
     /// Score of the best validation: mean total loss of the networks, mean over the groups.
@@ -122,97 +124,60 @@ impl FoundRun {
 const CONFIG: &str = "config.toml";
 /// What only a run has.
 const MARKS: [&str; 3] = ["checkpoints", "lock", "metrics.jsonl"];
+/// Logged steps whose median is shown.
 const LAST: usize = 100;
 
 impl RunSummary {
     /// Reads the run in `root`, whose configuration is `config`.
     fn read(root: &Path, config: &Config, checkpoint: Option<&Checkpoint>) -> Self {
-        let mut summary = Self::empty(root, config);
-        summary.read_steps(root);
-        summary.read_validations(root);
-        summary.checkpoint = checkpoint.map(|c| c.state.step);
-        let done = summary.step.max(summary.checkpoint.unwrap_or(0)) >= summary.total_steps;
-        summary.state = match (RunLock::is_held(root), done) {
+        let history = History::read(&RunDir::follow(root)).unwrap_or_default();
+        let (step, stage) = history.last.clone().unwrap_or_default();
+        let (best_step, best_score) = history.best.unzip();
+        let (checkpoint, total_steps) = (checkpoint.map(|c| c.state.step), config.total_steps());
+        let state = match (RunLock::is_held(root), step.max(checkpoint.unwrap_or(0)) >= total_steps) {
             (true, _) => "running",
             (false, true) => "finished",
             (false, false) => "stopped",
         };
-        summary
-    }
-
-    fn empty(root: &Path, config: &Config) -> Self {
-        Self {
+        let mut summary = Self {
             name: run_name(root),
             path: root.to_owned(),
-            state: "stopped",
-            step: 0,
-            total_steps: config.total_steps(),
-            stage: String::new(),
-            loss: None,
-            seconds_per_step: None,
-            skipped: 0,
-            spikes: 0,
-            best_step: None,
-            best_score: None,
+            state,
+            step,
+            total_steps,
+            stage,
+            loss: median_of_last(history.points("loss"), LAST),
+            seconds_per_step: median_of_last(history.points("seconds"), LAST),
+            skipped: history.skipped.len(),
+            spikes: history.spikes.len(),
+            best_step,
+            best_score,
             strain_ratio: None,
             inside: None,
             order_violations: None,
-            checkpoint: None,
+            checkpoint,
             seed: config.seed,
+        };
+        // Before the first step there is nothing to compare.
+        let validations = history.validations.iter().filter(|(step, _)| *step > 0);
+        for group in validations.flat_map(|(_, line)| line["groups"].as_array().into_iter().flatten()) {
+            summary.note_group(group);
         }
+        summary
     }
 
-    fn read_steps(&mut self, root: &Path) {
-        let (mut losses, mut times) = (Vec::new(), Vec::new());
-        for line in values(&root.join("metrics.jsonl")) {
-            let Some(step) = line["step"].as_u64() else { continue };
-            self.step = step;
-            self.stage = line["stage"].as_str().unwrap_or_default().to_owned();
-            self.skipped += u64::from(line["skipped"].as_bool() == Some(true));
-            self.spikes += u64::from(line["spike"].as_bool() == Some(true));
-            losses.extend(line["loss"].as_f64());
-            times.extend(line["seconds"].as_f64());
-        }
-        self.loss = median(&losses);
-        self.seconds_per_step = median(&times);
-    }
-
-    fn read_validations(&mut self, root: &Path) {
-        for line in values(&root.join("validation.jsonl")) {
-            // Before the first step there is nothing to compare.
-            if line["step"].as_u64().is_none_or(|step| step == 0) {
-                continue;
-            }
-            (self.best_step, self.best_score) = best_so_far(&line).unzip();
-            for group in line["groups"].as_array().into_iter().flatten() {
-                let methods = group["methods"].as_array().map_or(&[][..], Vec::as_slice);
-                let (Some(network), Some(skinning)) = (methods.last(), Method::start_of(methods)) else {
-                    continue;
-                };
-                if group["group"] == ValidationGroup::Layered.name() {
-                    self.order_violations = network["order_violations_nearest_vertex"].as_f64();
-                } else if group["group"] == ValidationGroup::Single.name() {
-                    let strain = |m: &Value| m["raw"]["strain"]["mean"].as_f64();
-                    self.strain_ratio = strain(network).zip(strain(skinning)).and_then(|(a, b)| ratio(a, b));
-                    self.inside = network["inside"].as_f64();
-                }
-            }
+    /// Takes in a group of a validation.
+    fn note_group(&mut self, group: &Value) {
+        let methods = group["methods"].as_array().map_or(&[][..], Vec::as_slice);
+        let (Some(network), Some(skinning)) = (methods.last(), Method::start_of(methods)) else { return };
+        if group["group"] == ValidationGroup::Layered.name() {
+            self.order_violations = network["order_violations_nearest_vertex"].as_f64();
+        } else if group["group"] == ValidationGroup::Single.name() {
+            let strain = |m: &Value| m["raw"]["strain"]["mean"].as_f64();
+            self.strain_ratio = strain(network).zip(strain(skinning)).and_then(|(a, b)| ratio(a, b));
+            self.inside = network["inside"].as_f64();
         }
     }
-}
-
-/// The lines of a log that are whole.
-fn values(path: &Path) -> impl Iterator<Item = Value> {
-    let file = std::fs::File::open(path).ok();
-    let lines = file.into_iter().flat_map(|f| BufReader::new(f).lines().map_while(Result::ok));
-    lines.filter_map(|line| serde_json::from_str(&line).ok())
-}
-
-/// Median of the last values.
-fn median(values: &[f64]) -> Option<f64> {
-    let mut last = values[values.len().saturating_sub(LAST)..].to_vec();
-    last.sort_by(f64::total_cmp);
-    last.get(last.len() / 2).copied()
 }
 
 /// All runs in `folder`: the folder itself, if it is a run, else those below it, by name.

@@ -1,9 +1,10 @@
 //! What a validation finds, as it stands in `validation.jsonl`: scores of methods over groups of scenes.
 
+use super::checkpoint::Best;
 use super::spread::Spread;
 use clothcombo_physics::energy::Term;
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -83,6 +84,12 @@ pub struct ValidationReport {
 }
 
 impl ValidationReport {
+    /// As it stands in `validation.jsonl`: the scores after `step` steps, and the best validation so far.
+    pub fn line(&self, step: u64, best: Option<Best>) -> Value {
+        let best = best.map(|best| json!({ "step": best.step, "score": best.score.0 }));
+        json!({ "step": step, "score": self.score(), "best": best, "groups": self.groups })
+    }
+
     /// One number to compare networks by: mean total loss of the whole network, mean over the groups; less is better.
     /// `None` without scenes, or where it is not finite.
     pub fn score(&self) -> Option<f64> {

@@ -3,7 +3,6 @@
 use crate::run::event::{Observer, StepRecord, TrainEvent};
 use crate::run::folder::RunDir;
 use crate::run::validation::Method;
-use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report};
 use serde_json::Value;
 use std::cell::RefCell;
@@ -30,7 +29,7 @@ pub struct History {
     points: BTreeMap<&'static str, Vec<(f64, f64)>>,
     /// Raw energies of the skinning that the networks start from, mean per scene, by validation group and term.
     pub baselines: BTreeMap<(String, &'static str), f64>,
-    /// Validations: step and report, as in `validation.jsonl`.
+    /// Validations: step and line of `validation.jsonl`.
     pub validations: Vec<(u64, Value)>,
     /// Step and score of the best one.
     pub best: Option<(u64, f64)>,
@@ -54,27 +53,8 @@ impl History {
     /// When a log exists but cannot be read.
     pub fn read(run: &RunDir) -> Result<Self, Report> {
         let mut history = Self::default();
-        for line in lines(run.metrics())? {
-            let Some(step) = line["step"].as_u64() else { continue };
-            let at = step as f64;
-            for name in StepRecord::term_names() {
-                history.push(name, at, line["raw"][name].as_f64());
-            }
-            for name in SCALARS {
-                history.push(name, at, line[name].as_f64());
-            }
-            if line["skipped"].as_bool() == Some(true) {
-                history.skipped.push(step);
-            }
-            if line["spike"].as_bool() == Some(true) {
-                history.spikes.push((step, line["grad_norm"].as_f64().unwrap_or(f64::INFINITY)));
-            }
-            history.last = Some((step, line["stage"].as_str().unwrap_or_default().to_owned()));
-        }
-        for line in lines(run.validation())? {
-            history.best = best_so_far(&line);
-            history.note_validation(line["step"].as_u64().unwrap_or(0), line);
-        }
+        lines(run.metrics())?.iter().for_each(|line| history.note_step(line));
+        lines(run.validation())?.into_iter().for_each(|line| history.note_validation(line));
         let pictures = std::fs::read_dir(run.samples()).into_iter().flatten().flatten().map(|e| e.path());
         history.samples = pictures.filter(|p| p.extension().is_some_and(|e| e == "png")).collect();
         history.samples.sort();
@@ -86,38 +66,50 @@ impl History {
         self.points.get(name).map_or(&[], Vec::as_slice)
     }
 
-    fn push(&mut self, name: &'static str, step: f64, value: Option<f64>) {
-        if let Some(value) = value {
-            self.points.entry(name).or_default().push((step, value));
+    /// Takes in a line of `metrics.jsonl`.
+    fn note_step(&mut self, line: &Value) {
+        let Some(step) = line["step"].as_u64() else { return };
+        let energies = StepRecord::term_names().map(|name| (name, &line["raw"][name]));
+        for (name, value) in energies.chain(SCALARS.map(|name| (name, &line[name]))) {
+            if let Some(value) = value.as_f64() {
+                self.points.entry(name).or_default().push((step as f64, value));
+            }
         }
+        if line["skipped"] == true {
+            self.skipped.push(step);
+        }
+        if line["spike"] == true {
+            self.spikes.push((step, line["grad_norm"].as_f64().unwrap_or(f64::INFINITY)));
+        }
+        self.last = Some((step, line["stage"].as_str().unwrap_or_default().to_owned()));
     }
 
-    fn note_validation(&mut self, step: u64, report: Value) {
+    /// Takes in a line of `validation.jsonl`.
+    fn note_validation(&mut self, line: Value) {
+        let best = &line["best"];
+        self.best = best["step"].as_u64().zip(best["score"].as_f64());
         if self.baselines.is_empty() {
-            for group in report["groups"].as_array().into_iter().flatten() {
+            for group in line["groups"].as_array().into_iter().flatten() {
                 let methods = group["methods"].as_array().map_or(&[][..], Vec::as_slice);
                 let Some(baseline) = Method::start_of(methods) else { continue };
                 let name = group["group"].as_str().unwrap_or_default();
-                for term in Term::ALL.into_iter().map(Term::name) {
+                for term in StepRecord::term_names() {
                     if let Some(value) = baseline["raw"][term]["mean"].as_f64() {
                         self.baselines.insert((name.to_owned(), term), value);
                     }
                 }
             }
         }
-        self.validations.push((step, report));
+        self.validations.push((line["step"].as_u64().unwrap_or(0), line));
     }
 }
 
-/// Step and score of the best validation so far, by a line of `validation.jsonl`.
-pub fn best_so_far(line: &Value) -> Option<(u64, f64)> {
-    let best = &line["best"];
-    best["step"].as_u64().zip(best["score"].as_f64())
-}
-
+/// The lines of a log that are whole; none where it is not there.
 fn lines(path: PathBuf) -> Result<Vec<Value>, Report> {
-    match std::fs::read_to_string(path) {
-        Ok(text) => Ok(text.lines().filter_map(|l| serde_json::from_str(l).ok()).collect()),
+    match std::fs::read(path) {
+        Ok(text) => {
+            Ok(text.split(|byte| *byte == b'\n').filter_map(|l| serde_json::from_slice(l).ok()).collect())
+        }
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
         Err(e) => Err(e).into_diagnostic(),
     }
@@ -128,36 +120,12 @@ pub struct HistoryObserver(pub SharedHistory);
 
 impl Observer for HistoryObserver {
     fn observe(&mut self, event: &TrainEvent) -> Result<(), Report> {
-        let mut guard = self.0.borrow_mut();
-        let history = &mut *guard;
+        let mut history = self.0.borrow_mut();
         match event {
-            TrainEvent::Step(record) => {
-                let step = record.step as f64;
-                record.raw.iter().for_each(|(name, value)| history.push(name, step, Some(*value)));
-                let scalars = [
-                    record.loss,
-                    record.grad_norm,
-                    record.lr,
-                    record.seconds,
-                    record.wait_seconds,
-                    record.forward_seconds,
-                    record.backward_seconds,
-                    record.update_seconds,
-                ];
-                SCALARS.into_iter().zip(scalars).for_each(|(name, v)| history.push(name, step, Some(v)));
-                if record.spike {
-                    history.spikes.push((record.step, record.grad_norm));
-                }
-                match &mut history.last {
-                    Some((last, stage)) if *stage == record.stage => *last = record.step,
-                    last => *last = Some((record.step, record.stage.clone())),
-                }
-            }
+            TrainEvent::Step(record) => history.note_step(&serde_json::to_value(record).into_diagnostic()?),
             TrainEvent::Validated { step, report, best } => {
-                history.best = best.map(|best| (best.step, best.score.0));
-                history.note_validation(*step, serde_json::to_value(report).into_diagnostic()?);
+                history.note_validation(report.line(*step, *best));
             }
-            TrainEvent::Skipped { step, .. } => history.skipped.push(*step),
             TrainEvent::SampleDrawn { path } => {
                 history.samples.retain(|p| p != path);
                 history.samples.push(path.to_path_buf());

@@ -1,18 +1,15 @@
 //! `log.txt`: what happened in a run besides its steps, one line each.
 
+use super::log_file::LogFile;
 use crate::run::event::{Observer, TrainEvent};
 use crate::run::folder::RunDir;
-use miette::{IntoDiagnostic, Report, WrapErr};
+use miette::Report;
 use std::fmt::Display;
-use std::fs::{File, OpenOptions};
-use std::io::Write;
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Appends to the log of a run. Nothing is ever removed from it: a step that is repeated after a resume stands there twice.
 pub struct LogObserver {
-    path: PathBuf,
-    file: File,
+    file: LogFile,
     /// What the session says of its device.
     device: String,
     start: Instant,
@@ -24,28 +21,21 @@ impl LogObserver {
     /// # Errors
     /// When it cannot be written.
     pub fn new(run: &RunDir, device: &str, earlier: Option<&str>) -> Result<Self, Report> {
-        let path = run.log();
-        let opened = OpenOptions::new().create(true).append(true).open(&path);
-        let file = opened.into_diagnostic().wrap_err_with(|| cannot_write(&path))?;
+        let file = LogFile::append(run.log(), Ok(()))?;
         let device = earlier.map_or_else(|| device.to_owned(), |earlier| moved(earlier, device));
-        Ok(Self { path, file, device, start: Instant::now() })
+        Ok(Self { file, device, start: Instant::now() })
     }
 
     /// One line, with the seconds since the session began.
     fn line(&mut self, text: impl Display) -> Result<(), Report> {
-        writeln!(self.file, "{:>10.1} s  {text}", self.start.elapsed().as_secs_f64())
-            .into_diagnostic()
-            .wrap_err_with(|| cannot_write(&self.path))
+        self.file.line(format_args!("{:>10.1} s  {text}", self.start.elapsed().as_secs_f64()))?;
+        self.file.flush()
     }
 }
 
 /// What to say of a run that moved from one device to another.
 pub fn moved(earlier: &str, now: &str) -> String {
     format!("{now}; the checkpoint was computed on {earlier}: the run goes on, its last bits may differ")
-}
-
-fn cannot_write(path: &Path) -> String {
-    format!("cannot write {}", path.display())
 }
 
 impl Observer for LogObserver {

@@ -2,12 +2,13 @@
 
 mod history;
 mod log;
+mod log_file;
 mod metrics;
 mod progress;
 mod report;
 mod tensorboard;
 
-pub use history::{History, HistoryObserver, SharedHistory, best_so_far};
+pub use history::{History, HistoryObserver, SharedHistory};
 pub use log::{LogObserver, moved};
 pub use metrics::MetricsObserver;
 pub use progress::ProgressObserver;
