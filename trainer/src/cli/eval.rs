@@ -7,7 +7,7 @@ use crate::cli::values::folder_to_make;
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::config::{Config, load};
 use crate::dataset::Dataset;
-use crate::evaluation::{Evaluation, ModelUnderTest, NamedModel, PART_KEYS, Page, SceneCounts};
+use crate::evaluation::{Evaluation, ModelUnderTest, NamedModel, Page, SceneCounts, part_keys};
 use crate::inference::shipped_model;
 use crate::run::checkpoint::TrainedModel;
 use crate::run::report::html::utc;
@@ -57,7 +57,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR", requires = "outfits", value_parser = folder_to_make())]
     meshes: Option<PathBuf>,
     /// Only these parts of the report
-    #[arg(long, value_delimiter = ',', value_name = "PARTS", value_parser = PossibleValuesParser::new(PART_KEYS))]
+    #[arg(long, value_delimiter = ',', value_name = "PARTS", value_parser = PossibleValuesParser::new(part_keys()))]
     only: Vec<String>,
     /// A model trained on the same data with a part left out, for the ablation table; repeatable
     #[arg(long, value_name = "NAME=DIR", value_parser = named)]

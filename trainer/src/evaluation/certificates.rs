@@ -2,10 +2,10 @@
 
 use super::layers::AFTER;
 use super::post_processor::DrapedScene;
-use super::table::{Column, median_and_p95, percent, percent_and_median, plain, proportion};
 use super::{Estimate, Evaluator, Proportion, Section, Table};
 use crate::dataset::{HeldOut, PreparedScene};
 use crate::inference::UniqueNames;
+use crate::run::report::table::{Column, median_and_p95, percent, percent_and_median, plain, proportion};
 use crate::system::single_threaded::map_single_threaded;
 use clothcombo_data::format::obj;
 use clothcombo_physics::contact::resolve::{Certificate, ResolveSettings, Resolved};

@@ -1,11 +1,11 @@
 //! Table 5: the time of every phase per garment.
 
-use super::table::{Column, median_and_p95, plain};
 use super::{Evaluator, Section, Table};
 use crate::inference::Draped;
 use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::networks::drape_on;
 use crate::inference::on_body::OnBody;
+use crate::run::report::table::{Column, median_and_p95, plain};
 use crate::run::spread::Spread;
 use clothcombo_model::Mode;
 use miette::{IntoDiagnostic, Report};

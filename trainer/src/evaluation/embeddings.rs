@@ -1,6 +1,5 @@
 //! Table 1: what the networks make of a garment with a wrong embedding.
 
-use super::table::{Column, mean_and_median, plain};
 use super::{Evaluator, GarmentSet, PAPER_COLLISION, Scenes, Section, Table, estimates};
 use crate::dataset::{HeldOut, PreparedScene};
 use crate::inference::Draped;
@@ -8,6 +7,7 @@ use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::networks::forward_on;
 use crate::inference::on_body::OnBody;
 use crate::inference::tensor_store::DrapeError;
+use crate::run::report::table::{Column, mean_and_median, plain};
 use burn::tensor::{Int, Tensor};
 use clothcombo_model::{GarmentEmbedding, Mode};
 use clothcombo_physics::energy::Term;

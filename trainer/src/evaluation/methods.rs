@@ -1,15 +1,15 @@
 //! Table 2: the networks against linear blend skinning, one garment per scene.
 
-use super::table::{
-    Column, mean_and_median, mean_with_interval, median_and_p95, number, percent, percent_and_median, plain,
-    ratio_with_interval,
-};
 use super::{
     DrapeMetrics, Estimate, Evaluator, GarmentSet, Metric, PAPER_COLLISION, Ratio, Scenes, Section, Table,
     drape_by, estimates,
 };
 use crate::dataset::HeldOut;
 use crate::inference::tensor_store::DrapeError;
+use crate::run::report::table::{
+    Column, mean_and_median, mean_with_interval, median_and_p95, number, percent, percent_and_median, plain,
+    ratio_with_interval,
+};
 use crate::run::validation::Method;
 use clothcombo_data::asset::Category;
 use clothcombo_physics::energy::Term;

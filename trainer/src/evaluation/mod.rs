@@ -25,7 +25,6 @@ mod scene_evaluation;
 mod score;
 mod sets;
 mod stress_tests;
-mod table;
 mod timing;
 mod validation;
 mod variants;
@@ -36,6 +35,7 @@ pub use page::Page;
 pub use timing::median_ms;
 pub use validation::ValidationSet;
 
+use crate::run::report::table::Table;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use drape_metrics::{DrapeMetrics, PAPER_COLLISION, estimates};
 use estimate::{Estimate, Metric, Proportion, Ratio};
@@ -47,7 +47,6 @@ use scene_evaluation::drape_by;
 use serde_json::{Value, json};
 use sets::{GarmentSet, Scenes};
 use std::path::Path;
-use table::Table;
 
 /// Everything that was measured of a model.
 pub struct Evaluation {
@@ -60,7 +59,7 @@ pub struct Evaluation {
 }
 
 /// A part of an evaluation.
-struct Part {
+struct EvaluationPart {
     /// What `--only` calls it.
     key: &'static str,
     name: &'static str,
@@ -70,65 +69,33 @@ struct Part {
     sections: fn(&Evaluator<'_>) -> Result<Vec<Section>, Report>,
 }
 
-const PARTS: [Part; 11] = [
-    Part { key: "sets", name: "sets", scenes: |_| 0, sections: sets::sections },
-    Part {
-        key: "methods",
-        name: "Table 2: methods",
-        scenes: methods::scene_count,
-        sections: methods::sections,
-    },
-    Part {
-        key: "embeddings",
-        name: "Table 1: embeddings",
-        scenes: embeddings::scene_count,
-        sections: embeddings::sections,
-    },
-    Part { key: "layers", name: "Table 3: layers", scenes: layers::scene_count, sections: layers::sections },
-    Part {
-        key: "certificates",
-        name: "certificates of random outfits",
-        scenes: |e| e.counts.outfits,
-        sections: certificates::sections,
-    },
-    Part {
-        key: "ablations",
-        name: "Table 4: ablations",
-        scenes: variants::scene_count,
-        sections: variants::sections,
-    },
-    Part {
-        key: "times",
-        name: "Table 5: times",
-        scenes: |e| e.counts.timed,
-        sections: drape_times::sections,
-    },
-    Part {
-        key: "pareto",
-        name: "speed against error",
-        scenes: pareto::scene_count,
-        sections: pareto::sections,
-    },
-    Part { key: "numerics", name: "numerical choices", scenes: |_| 0, sections: numerics::sections },
-    Part {
-        key: "stress",
-        name: "stress tests",
-        scenes: stress_tests::scene_count,
-        sections: stress_tests::sections,
-    },
-    Part { key: "gallery", name: "pictures", scenes: gallery::picture_count, sections: gallery::sections },
+const PARTS: [EvaluationPart; 11] = [
+    part("sets", "sets", |_| 0, sets::sections),
+    part("methods", "Table 2: methods", methods::scene_count, methods::sections),
+    part("embeddings", "Table 1: embeddings", embeddings::scene_count, embeddings::sections),
+    part("layers", "Table 3: layers", layers::scene_count, layers::sections),
+    part("certificates", "certificates of random outfits", |e| e.counts.outfits, certificates::sections),
+    part("ablations", "Table 4: ablations", variants::scene_count, variants::sections),
+    part("times", "Table 5: times", |e| e.counts.timed, drape_times::sections),
+    part("pareto", "speed against error", |e| e.counts.pareto.iter().sum(), pareto::sections),
+    part("numerics", "numerical choices", |_| 0, numerics::sections),
+    part("stress", "stress tests", stress_tests::scene_count, stress_tests::sections),
+    part("gallery", "pictures", gallery::picture_count, gallery::sections),
 ];
 
+const fn part(
+    key: &'static str,
+    name: &'static str,
+    scenes: fn(&Evaluator<'_>) -> usize,
+    sections: fn(&Evaluator<'_>) -> Result<Vec<Section>, Report>,
+) -> EvaluationPart {
+    EvaluationPart { key, name, scenes, sections }
+}
+
 /// Names of the parts of an evaluation, in their order.
-pub const PART_KEYS: [&str; PARTS.len()] = {
-    let mut keys = [""; PARTS.len()];
-    let mut part = 0;
-    while part < PARTS.len() {
-        keys[part] = PARTS[part].key;
-        part += 1;
-    }
-    keys
-};
+pub fn part_keys() -> impl Iterator<Item = &'static str> {
+    PARTS.iter().map(|part| part.key)
+}
 
 impl Evaluation {
     /// Measures `model` by the parts whose keys `is_wanted`. `ablations` are models trained with a part left out on the same

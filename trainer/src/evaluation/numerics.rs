@@ -1,6 +1,5 @@
 //! Time and error of numerical choices: precision of the weights, eigenpairs, distance to the body.
 
-use super::table::{Column, number, plain};
 use super::{Evaluator, ModelUnderTest, Section, Table};
 use crate::dataset::{Dataset, HeldOut, PreparedScene};
 use crate::evaluation::equilibrium_error::mean_distance;
@@ -9,6 +8,7 @@ use crate::inference::Draped;
 use crate::inference::networks::Networks;
 use crate::inference::reference::wide;
 use crate::inference::tensor_store::{DrapeError, TensorStore};
+use crate::run::report::table::{Column, number, plain};
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{Tensor, TensorData, bf16, f16};
 use clothcombo_physics::energy::SceneEnergy;

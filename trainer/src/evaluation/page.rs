@@ -1,13 +1,8 @@
 //! The report as Markdown with pictures beside it, and as one HTML page that needs nothing but itself.
 
-use super::table::Table;
-use crate::picture::svg;
-use crate::run::report::html::escape;
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
+use crate::run::report::html::{escape, figure, image, page, paragraph};
+use crate::run::report::table::Table;
 use serde_json::Value;
-
-const STYLE: &str = include_str!("../run/report/report.css");
 
 /// A part of the report.
 pub struct Section {
@@ -83,36 +78,19 @@ impl Page {
 
     /// As one page of HTML.
     pub fn html(&self) -> String {
-        let facts: String = self
-            .facts
-            .iter()
-            .map(|(name, value)| format!("<p>{}: {}</p>", escape(name), escape(value)))
-            .collect();
+        let fact = |(name, value): &(&str, String)| paragraph(&format!("{name}: {value}"));
+        let facts: String = self.facts.iter().map(fact).collect();
         let section = |section: &Section| {
             let tables: String = section.tables.iter().map(Table::html).collect();
-            let picture = |picture: &Picture| {
-                let caption = escape(&picture.caption);
-                let shown = picture.html.clone().unwrap_or_else(|| {
-                    let png = STANDARD.encode(&picture.png);
-                    format!("<img alt=\"{caption}\" src=\"data:image/png;base64,{png}\">")
-                });
-                format!("<figure class=\"sample\"><figcaption>{caption}</figcaption>{shown}</figure>\n")
+            let picture = |Picture { caption, png, html, .. }: &Picture| {
+                figure(caption, &html.clone().unwrap_or_else(|| image(caption, png)))
             };
             let pictures: String = section.pictures.iter().map(picture).collect();
-            let text = if section.text.is_empty() {
-                String::new()
-            } else {
-                format!("<p>{}</p>", escape(&section.text))
-            };
-            format!("<section><h2>{}</h2>{text}{tables}{pictures}</section>\n", escape(section.title))
+            let (title, text) = (escape(section.title), paragraph(&section.text));
+            format!("<section><h2>{title}</h2>{text}{tables}{pictures}</section>\n")
         };
         let sections: String = self.sections.iter().map(section).collect();
-        format!(
-            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-             <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{title}</title><style>{}{STYLE}</style></head>\n\
-             <body><header><h1>{title}</h1>{facts}</header>\n{sections}</body></html>\n",
-            svg::STYLE,
-            title = escape(&self.title)
-        )
+        let body = format!("<header><h1>{}</h1>{facts}</header>\n{sections}", escape(&self.title));
+        page(&self.title, "", &body)
     }
 }

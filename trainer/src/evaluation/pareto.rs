@@ -2,7 +2,6 @@
 
 use super::equilibrium_error::StateError;
 use super::page::Picture;
-use super::table::{Column, median_with_interval, plain};
 use super::{Estimate, Evaluator, Metric, Section, Table, drape_by, median_ms};
 use crate::dataset::PreparedScene;
 use crate::inference::layer_interaction::LayerInteraction;
@@ -11,6 +10,7 @@ use crate::inference::tensor_store::DrapeError;
 use crate::inference::{RefineSteps, refine};
 use crate::picture::chart::{Chart, ChartGrid, Line};
 use crate::picture::png_bytes;
+use crate::run::report::table::{Column, median_with_interval, plain};
 use crate::run::validation::Method;
 use crate::system::single_threaded::map_single_threaded;
 use clothcombo_physics::energy::Term;
@@ -75,10 +75,6 @@ struct State {
     method: String,
     milliseconds: f64,
     positions: Vec<[f64; 3]>,
-}
-
-pub fn scene_count(evaluator: &Evaluator<'_>) -> usize {
-    evaluator.counts.pareto.iter().sum()
 }
 
 /// Scenes of one garment and of an outfit draped by all methods. The networks are timed with all threads, one scene at

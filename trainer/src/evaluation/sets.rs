@@ -1,9 +1,9 @@
 //! The sets of garments and poses that an evaluation keeps apart: what was trained on, what validation looked at, and the test
 //! set, which no run reads.
 
-use super::table::{Column, plain};
 use super::{Evaluator, Section, Table};
 use crate::dataset::{Dataset, HeldOut, SceneSample, round_robin};
+use crate::run::report::table::{Column, plain};
 use miette::Report;
 use serde::Serialize;
 use serde_json::json;

@@ -1,10 +1,10 @@
 //! Stress tests: bodies, poses and stacks far outside of the training data, through networks and post-process.
 
-use super::table::{Column, number, percent, plain};
 use super::{Evaluator, Section, Table, drape_by};
 use crate::dataset::{BodySample, PreparedScene, SceneSample};
 use crate::inference::Draped;
 use crate::inference::tensor_store::DrapeError;
+use crate::run::report::table::{Column, number, percent, plain};
 use crate::run::spread::Spread;
 use crate::run::validation::Method;
 use crate::system::single_threaded::map_single_threaded;

@@ -1,11 +1,11 @@
 //! Table 4 and the garment-specific reference: other models on the same scenes.
 
-use super::table::{Column, mean_and_median, number, percent, plain};
 use super::{
     DrapeMetrics, Evaluator, ModelUnderTest, NamedModel, PAPER_COLLISION, Section, Table, drape_by, estimates,
 };
 use crate::dataset::HeldOut;
 use crate::inference::tensor_store::DrapeError;
+use crate::run::report::table::{Column, mean_and_median, number, percent, plain};
 use crate::run::validation::Method;
 use clothcombo_physics::energy::Term;
 use miette::Report;

@@ -2,6 +2,38 @@
 
 pub(crate) use crate::picture::svg::escape;
 
+use crate::picture::svg;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+const PAGE_STYLE: &str = include_str!("report.css");
+
+/// A page that needs nothing but itself; `head` and `body` are elements.
+pub fn page(title: &str, head: &str, body: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">{head}<title>{}</title>\
+         <style>{}{PAGE_STYLE}</style></head>\n<body>{body}</body></html>\n",
+        escape(title),
+        svg::STYLE
+    )
+}
+
+/// Elements under a caption.
+pub fn figure(caption: &str, elements: &str) -> String {
+    format!("<figure class=\"sample\"><figcaption>{}</figcaption>{elements}</figure>\n", escape(caption))
+}
+
+/// A PNG picture.
+pub fn image(caption: &str, png: &[u8]) -> String {
+    format!("<img alt=\"{}\" src=\"data:image/png;base64,{}\">", escape(caption), STANDARD.encode(png))
+}
+
+/// A paragraph; none of no text.
+pub fn paragraph(text: &str) -> String {
+    if text.is_empty() { String::new() } else { format!("<p>{}</p>", escape(text)) }
+}
+
 /// Seconds since 1970 as `2026-11-21 18:45 UTC`.
 pub fn utc(seconds: u64) -> String {
     // Howard Hinnant's civil_from_days, for days from 1970 on.

@@ -2,6 +2,7 @@
 
 mod charts;
 pub mod html;
+pub mod table;
 
 pub use charts::StageBaseline;
 pub(super) use charts::charts;
@@ -9,16 +10,13 @@ pub(super) use charts::charts;
 use crate::dataset::LicenceLine;
 use crate::picture::chart::axis::number_text;
 use crate::picture::chart::{Steps, legend_html, median_of_last};
-use crate::picture::svg;
 use crate::run::memory::MemoryEstimate;
 use crate::run::observer::History;
 use crate::system::memory::gibibytes;
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
-use html::{escape, utc};
+use html::{escape, figure, image, utc};
 use serde_json::Value;
-use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use table::{Column, Table, plain};
 
 /// Where a run stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,34 +76,42 @@ pub struct Page<'a> {
 /// Sample sheets shown, newest first.
 const SAMPLES: usize = 2;
 
-const STYLE: &str = include_str!("report.css");
+/// What is shown of every method of a validation.
+const VALIDATION: [Column<'_>; 9] = [
+    ("method", "/method", plain),
+    ("total", "/total/mean", four_digits),
+    ("median", "/total/median", four_digits),
+    ("strain", "/raw/strain/mean", four_digits),
+    ("bending", "/raw/bending/mean", four_digits),
+    ("gravity", "/raw/gravity/mean", four_digits),
+    ("inside %", "/inside", hundredths_of_percent),
+    ("> 5 mm %", "/deeper_than_5mm", hundredths_of_percent),
+    ("layer-order violations %", "/order_violations_nearest_vertex", hundredths_of_percent),
+];
+
+fn four_digits(value: &Value) -> String {
+    value.as_f64().map_or("–".to_owned(), |value| number_text(value, 4))
+}
+
+fn hundredths_of_percent(share: &Value) -> String {
+    share.as_f64().map_or("–".to_owned(), |share| format!("{:.2}", 100.0 * share))
+}
 
 impl Page<'_> {
     /// The page.
     pub fn html(&self) -> String {
-        let mut out = String::new();
-        let _ = writeln!(
-            out,
-            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-                <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">{}<title>{} – {}</title><style>{}{STYLE}</style></head>\n<body>",
-            // A page that is still being written looks for its next version.
-            if self.state == RunState::Running { "<meta http-equiv=\"refresh\" content=\"30\">" } else { "" },
-            escape(self.name),
-            self.state.name(),
-            svg::STYLE,
-        );
-        out.push_str(&self.header());
-        out.push_str(&self.curves());
-        out.push_str(&self.validation());
-        out.push_str(&self.samples());
-        out.push_str(&self.licence_list());
-        let _ = writeln!(
-            out,
-            "<section id=\"config\"><h2>Configuration</h2><details><summary>every value used</summary><pre>{}</pre></details></section>",
+        // A page that is still being written looks for its next version.
+        let refresh = match self.state {
+            RunState::Running => "<meta http-equiv=\"refresh\" content=\"30\">",
+            _ => "",
+        };
+        let config = format!(
+            "<section id=\"config\"><h2>Configuration</h2><details><summary>every value used</summary><pre>{}</pre></details></section>\n",
             escape(self.config)
         );
-        out.push_str("</body></html>\n");
-        out
+        let curves = self.curves();
+        let parts = [self.header(), curves, self.validation(), self.samples(), self.licence_list(), config];
+        html::page(&format!("{} – {}", self.name, self.state.name()), refresh, &parts.concat())
     }
 
     fn header(&self) -> String {
@@ -164,82 +170,41 @@ impl Page<'_> {
 
     fn validation(&self) -> String {
         let Some((step, report)) = self.history.validations.last() else { return String::new() };
-        let mut out = format!("<section id=\"validation\"><h2>Validation after step {step}</h2>\n");
-        for group in report["groups"].as_array().into_iter().flatten() {
-            let name = group["group"].as_str().unwrap_or_default();
-            let _ = write!(
-                out,
-                "<table><caption>{}, {} scenes</caption><tr><th>method</th><th>total</th><th>median</th><th>strain</th>\
-                    <th>bending</th><th>gravity</th><th>inside %</th><th>&gt; 5 mm %</th><th>layer-order violations %</th></tr>",
-                escape(name),
-                group["scenes"]
-            );
-            for method in group["methods"].as_array().into_iter().flatten() {
-                let number = |v: &Value| v.as_f64().map_or("–".into(), |v| number_text(v, 4));
-                let percent = |v: &Value| v.as_f64().map_or("–".into(), |v| format!("{:.2}", 100.0 * v));
-                let _ = write!(
-                    out,
-                    "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-                    escape(method["method"].as_str().unwrap_or_default()),
-                    number(&method["total"]["mean"]),
-                    number(&method["total"]["median"]),
-                    number(&method["raw"]["strain"]["mean"]),
-                    number(&method["raw"]["bending"]["mean"]),
-                    number(&method["raw"]["gravity"]["mean"]),
-                    percent(&method["inside"]),
-                    percent(&method["deeper_than_5mm"]),
-                    percent(&method["order_violations_nearest_vertex"]),
-                );
-            }
-            out.push_str("</table>\n");
-        }
-        out.push_str("</section>\n");
-        out
+        let table = |group: &Value| {
+            let title = format!("{}, {} scenes", plain(&group["group"]), group["scenes"]);
+            let methods = group["methods"].as_array().map_or(&[][..], Vec::as_slice);
+            Table::new(title, methods, &VALIDATION).html()
+        };
+        let tables: String = report["groups"].as_array().into_iter().flatten().map(table).collect();
+        format!("<section id=\"validation\"><h2>Validation after step {step}</h2>\n{tables}</section>\n")
     }
 
     fn samples(&self) -> String {
-        let mut out = String::from("<section id=\"samples\"><h2>Samples</h2>\n");
-        let mut shown = 0;
-        for path in self.history.samples.iter().rev().take(SAMPLES) {
+        let sample = |path: &PathBuf| {
             // A picture that was deleted is no reason to have no report.
-            let Ok(png) = std::fs::read(path) else { continue };
-            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let _ = writeln!(
-                out,
-                "<figure class=\"sample\"><figcaption>{}</figcaption><img alt=\"{}\" src=\"data:image/png;base64,{}\"></figure>",
-                escape(&name),
-                escape(&name),
-                STANDARD.encode(png)
-            );
-            shown += 1;
-        }
-        if shown == 0 {
-            out.push_str("<p>none drawn yet</p>");
-        }
-        out.push_str("</section>\n");
-        out
+            let png = std::fs::read(path).ok()?;
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            Some(figure(&name, &image(&name, &png)))
+        };
+        let shown: String = self.history.samples.iter().rev().take(SAMPLES).filter_map(sample).collect();
+        let shown = if shown.is_empty() { "<p>none drawn yet</p>" } else { &shown };
+        format!("<section id=\"samples\"><h2>Samples</h2>\n{shown}</section>\n")
     }
 
     fn licence_list(&self) -> String {
-        let mut out = String::from(
-            "<section id=\"licences\"><h2>Data and licences</h2><table><tr><th>data</th><th>number</th><th>licence</th>\
-                <th>author</th><th>source</th></tr>",
-        );
-        for line in self.licences {
-            let known = |text: &str| if text.is_empty() { "unknown".to_owned() } else { escape(text) };
+        let row = |line: &LicenceLine| {
+            let known = |text: &str| if text.is_empty() { "unknown" } else { text }.to_owned();
             let and_others = if line.count > 1 { ", …" } else { "" };
-            let _ = write!(
-                out,
-                "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}{and_others}</td></tr>",
-                line.kind,
-                line.count,
-                known(&line.from.licence),
-                known(&line.from.author),
-                known(&line.from.source)
-            );
-        }
-        out.push_str("</table></section>\n");
-        out
+            let [licence, author, source] =
+                [&line.from.licence, &line.from.author, &line.from.source].map(|text| known(text));
+            vec![line.kind.to_string(), line.count.to_string(), licence, author, source + and_others]
+        };
+        let table = Table {
+            head: ["data", "number", "licence", "author", "source"].map(str::to_owned).to_vec(),
+            rows: self.licences.iter().map(row).collect(),
+            ..Table::default()
+        };
+        format!("<section id=\"licences\"><h2>Data and licences</h2>{}</section>\n", table.html())
     }
 }
 

@@ -1,7 +1,7 @@
-//! A table of values of `eval.json`, written as Markdown and as HTML.
+//! A table of JSON values, written as Markdown and as HTML.
 
+use super::html::{escape, paragraph};
 use crate::picture::chart::axis::number_text;
-use crate::run::report::html::escape;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -22,14 +22,10 @@ pub struct Table {
 pub type Column<'a> = (&'a str, &'a str, fn(&Value) -> String);
 
 impl Table {
-    /// A view of `rows`.
-    ///
-    /// # Panics
-    /// If a row lacks a value, which may be null.
+    /// A view of `rows`; a value that a row lacks is null.
     pub fn new(title: impl Into<String>, rows: &[Value], columns: &[Column<'_>]) -> Self {
-        let cell = |row: &Value, (_, pointer, text): &Column<'_>| {
-            text(row.pointer(pointer).unwrap_or_else(|| panic!("no {pointer} in {row}")))
-        };
+        let cell =
+            |row: &Value, (_, pointer, text): &Column<'_>| text(row.pointer(pointer).unwrap_or(&Value::Null));
         Self {
             title: title.into(),
             note: String::new(),
@@ -80,11 +76,10 @@ impl Table {
             row.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect()
         };
         let rows: String = self.rows.iter().map(|row| format!("<tr>{}</tr>\n", cells("td", row))).collect();
-        let note =
-            if self.note.is_empty() { String::new() } else { format!("<p>{}</p>", escape(&self.note)) };
         format!(
-            "<table><caption>{}{note}</caption><tr>{}</tr>\n{rows}</table>\n",
+            "<table><caption>{}{}</caption><tr>{}</tr>\n{rows}</table>\n",
             escape(&self.title),
+            paragraph(&self.note),
             cells("th", &self.head)
         )
     }
