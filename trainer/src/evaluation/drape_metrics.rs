@@ -1,6 +1,6 @@
 //! What is measured of a drape: energies, depths and exact intersections; and of a method over many scenes.
 
-use super::score::{SceneScore, score_scene};
+use super::score::{SceneScore, report_garments, score_scene};
 use super::{Estimate, Metric};
 use crate::dataset::PreparedScene;
 use crate::inference::Draped;
@@ -51,10 +51,7 @@ pub fn measure(scene: &PreparedScene, drapes: &[Draped]) -> Vec<DrapeMetrics> {
     let topologies: Vec<_> = scene.garments.iter().map(|g| Topology::new(&g.garment.rest)).collect();
     let measured = |draped: &Draped| {
         let positions = wide(&draped.posed);
-        let parts = scene.parts(&positions).into_iter().zip(&scene.garments);
-        let garments: Vec<ReportGarment> = parts
-            .map(|(positions, garment)| ReportGarment { positions, faces: garment.garment.rest.faces() })
-            .collect();
+        let garments = report_garments(scene, &positions);
         let report = contact::Report::count(&body, &garments, &selection);
         let degrees = garments.iter().zip(&report.garments).zip(&topologies);
         let degrees = degrees.map(|((&ReportGarment { positions, faces }, found), topology)| {

@@ -4,6 +4,7 @@ use super::equilibrium_error::StateError;
 use super::page::Picture;
 use super::{Estimate, Evaluator, Metric, Section, Table, drape_by, median_ms};
 use crate::dataset::PreparedScene;
+use crate::inference::Draped;
 use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::reference::{ReferenceScene, wide};
 use crate::inference::tensor_store::DrapeError;
@@ -185,19 +186,16 @@ impl Comparison {
 fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<State>, Report> {
     let Evaluator { networks, post_process, settings, .. } = evaluator;
     // The garment is embedded in the first, unmeasured drape, as for the next frame of a motion.
-    let timed = |method: Method| -> Result<State, DrapeError> {
-        let milliseconds = median_ms(SECONDS, || drape_by(networks, &[method], scene))?;
-        let positions = wide(&drape_by(networks, &[method], scene)?[0].posed);
-        Ok(State { method: method.name().to_owned(), milliseconds, positions })
+    let timed = |method: &str, drape: &dyn Fn() -> Result<Draped, DrapeError>| {
+        let milliseconds = median_ms(SECONDS, drape)?;
+        let positions = wide(&drape()?.posed);
+        Ok::<_, DrapeError>(State { method: method.to_owned(), milliseconds, positions })
     };
-    let mut states = Vec::new();
-    for method in [Method::Lbs, Method::LbsWithShapeTransfer] {
-        states.push(timed(method)?);
-    }
-    let milliseconds = median_ms(SECONDS, || networks.forward(scene, LayerInteraction::Together))?;
-    let positions = wide(&networks.forward(scene, LayerInteraction::Together)?.posed);
-    states.push(State { method: "network, forward pass".to_owned(), milliseconds, positions });
-    let network = timed(Method::Network)?;
+    let by = |method: Method| timed(method.name(), &|| Ok(drape_by(networks, &[method], scene)?.remove(0)));
+    let mut states = vec![by(Method::Lbs)?, by(Method::LbsWithShapeTransfer)?];
+    let forward = || networks.forward(scene, LayerInteraction::Together);
+    states.push(timed("network, forward pass", &forward)?);
+    let network = by(Method::Network)?;
     let draped = networks.drape(scene)?;
     // Once: it may take seconds.
     let clock = Instant::now();

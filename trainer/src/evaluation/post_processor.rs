@@ -2,6 +2,7 @@
 
 use super::ModelUnderTest;
 use crate::dataset::{DatasetError, PreparedScene};
+use crate::inference::reference::wide;
 use clothcombo_data::asset::{Garment, infeasible_pair};
 use clothcombo_physics::contact::resolve::{
     Certificate, Layer, PathSample, ResolveError, ResolveSettings, Resolved, RestGarment, certify,
@@ -50,7 +51,7 @@ impl<'a> PostProcessor<'a> {
             scene,
             body: scene.exact_body(),
             garments: rest.collect(),
-            positions: wide(scene, packed),
+            positions: scene.parts(packed).into_iter().map(wide).collect(),
         }
     }
 
@@ -66,12 +67,6 @@ impl<'a> PostProcessor<'a> {
         let draped = scene.parts(&skinned).into_iter().map(<[_]>::to_vec).collect();
         Ok(PathSample { body: Arc::new(scene.exact_body()), draped, transforms })
     }
-}
-
-/// Packed positions per garment.
-fn wide(scene: &PreparedScene, packed: &[[f32; 3]]) -> Vec<Vec<[f64; 3]>> {
-    let wide = |part: &[[f32; 3]]| part.iter().map(|p| p.map(f64::from)).collect();
-    scene.parts(packed).into_iter().map(wide).collect()
 }
 
 /// A scene's body and garments as the post-process takes them.

@@ -2,6 +2,7 @@
 
 use crate::dataset::PreparedScene;
 use crate::inference::Draped;
+use crate::inference::reference::wide;
 use crate::run::spread::Spread;
 use crate::run::validation::MethodScore;
 use clothcombo_physics::contact::{
@@ -44,18 +45,21 @@ pub fn score_scene(scene: &PreparedScene, body: &Surface<f64>, draped: &Draped) 
             }
         }
     }
-    let positions: Vec<[f64; 3]> = draped.posed.iter().map(|p| p.map(f64::from)).collect();
-    let garments: Vec<ReportGarment> = scene
-        .parts(&positions)
-        .into_iter()
-        .zip(&scene.garments)
-        .map(|(positions, garment)| ReportGarment { positions, faces: garment.garment.rest.faces() })
-        .collect();
+    let positions = wide(&draped.posed);
+    let garments = report_garments(scene, &positions);
     let order = LayerOrder::NearestVertex;
     let selection = Selection { layers: &scene.contacts, order, triangles: false, body_itself: false };
     let report = Report::count(&CountedBody::new(body, Distance::ClosestPoint), &garments, &selection);
     (score.penetration, score.order) = (report.penetration(DEEP), report.order());
     score
+}
+
+/// The garments of `scene` at packed `positions`, to be counted.
+pub fn report_garments<'a>(scene: &'a PreparedScene, positions: &'a [[f64; 3]]) -> Vec<ReportGarment<'a>> {
+    let parts = scene.parts(positions).into_iter().zip(&scene.garments);
+    parts
+        .map(|(positions, garment)| ReportGarment { positions, faces: garment.garment.rest.faces() })
+        .collect()
 }
 
 /// Gathers the scores of `method` over scenes.

@@ -100,50 +100,47 @@ impl ValidationReport {
     }
 }
 
+/// What a table for the terminal shows of a method: headings, widths, cells.
+const COLUMNS: [(&str, usize, fn(&MethodScore) -> String); 10] = [
+    ("total", 10, |m| format!("{:.3}", m.total.mean)),
+    ("median", 10, |m| format!("{:.3}", m.total.median)),
+    ("strain", 10, |m| format!("{:.3}", m.raw_mean(Term::Strain))),
+    ("bending", 10, |m| format!("{:.4}", m.raw_mean(Term::Bending))),
+    ("gravity", 10, |m| format!("{:.3}", m.raw_mean(Term::Gravity))),
+    ("collision", 12, |m| format!("{:.2e}", m.raw_mean(Term::BodyCollision))),
+    ("holding", 10, |m| format!("{:.4}", m.raw_mean(Term::Holding))),
+    ("inside %", 10, |m| format!("{:.2}", 100.0 * m.inside)),
+    (">5 mm %", 10, |m| format!("{:.2}", 100.0 * m.deeper_than_5mm)),
+    ("violations %", 13, |m| format!("{:.2}", 100.0 * m.order_violations_nearest_vertex)),
+];
+
+impl MethodScore {
+    fn raw_mean(&self, term: Term) -> f64 {
+        self.raw[term.name()].mean
+    }
+}
+
 impl fmt::Display for ValidationReport {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         for group in &self.groups {
             writeln!(f, "{} ({} scenes; energies raw in J, mean per scene)", group.group, group.scenes)?;
-            writeln!(
-                f,
-                "  {:<21}{:>10}{:>10}{:>10}{:>10}{:>10}{:>12}{:>10}{:>10}{:>10}{:>13}",
-                "method",
-                "total",
-                "median",
-                "strain",
-                "bending",
-                "gravity",
-                "collision",
-                "holding",
-                "inside %",
-                ">5 mm %",
-                "violations %"
-            )?;
-            for m in &group.methods {
-                let raw = |t: Term| m.raw[t.name()].mean;
-                writeln!(
-                    f,
-                    "  {:<21}{:>10.3}{:>10.3}{:>10.3}{:>10.4}{:>10.3}{:>12.2e}{:>10.4}{:>10.2}{:>10.2}{:>13.2}",
-                    m.method,
-                    m.total.mean,
-                    m.total.median,
-                    raw(Term::Strain),
-                    raw(Term::Bending),
-                    raw(Term::Gravity),
-                    raw(Term::BodyCollision),
-                    raw(Term::Holding),
-                    100.0 * m.inside,
-                    100.0 * m.deeper_than_5mm,
-                    100.0 * m.order_violations_nearest_vertex
-                )?;
+            write!(f, "  {:<21}", "method")?;
+            for (heading, width, _) in COLUMNS {
+                write!(f, "{heading:>width$}")?;
             }
+            for method in &group.methods {
+                write!(f, "\n  {:<21}", method.method)?;
+                for (_, width, text) in COLUMNS {
+                    write!(f, "{:>width$}", text(method))?;
+                }
+            }
+            writeln!(f)?;
             let Some((last, others)) = group.methods.split_last() else { continue };
             for baseline in others {
-                let strain = |method: &MethodScore| method.raw[Term::Strain.name()].mean;
-                let [strain, total] =
-                    [(strain(last), strain(baseline)), (last.total.mean, baseline.total.mean)].map(
-                        |(value, whole)| ratio(value, whole).map_or("–".into(), |r| format!("× {r:.3}")),
-                    );
+                let times =
+                    |value: f64, whole| ratio(value, whole).map_or("–".into(), |r| format!("× {r:.3}"));
+                let strain = times(last.raw_mean(Term::Strain), baseline.raw_mean(Term::Strain));
+                let total = times(last.total.mean, baseline.total.mean);
                 writeln!(f, "  {} against {}: strain {strain}, total {total}", last.method, baseline.method)?;
             }
         }

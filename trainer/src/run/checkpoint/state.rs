@@ -93,6 +93,18 @@ impl CheckpointState {
         Dimensions { joints: self.joints.len(), shape: self.shape_count, pose: self.pose_features }
     }
 
+    /// In which inputs of the networks those of `data` differ from its own, in words; `what` it is of.
+    pub fn changed_sizes(&self, data: &Self, what: &str) -> Vec<String> {
+        let sizes = |state: &Self| {
+            let counts = [state.shape_count, state.pose_features].map(|count| count.to_string());
+            [[state.joints.join(", ")].as_slice(), &counts].concat()
+        };
+        let names = ["joints", "shape components", "numbers of a pose"];
+        let sizes = names.into_iter().zip(sizes(data).into_iter().zip(sizes(self)));
+        let changed = sizes.filter(|(_, (now, before))| now != before);
+        changed.map(|(name, (now, before))| format!("{name}: {now} now; {before} in the {what}")).collect()
+    }
+
     /// As text, with the checksum of that text as its last line.
     pub(super) fn sealed(&self) -> Result<String, serde_json::Error> {
         let text = serde_json::to_string_pretty(self)?;

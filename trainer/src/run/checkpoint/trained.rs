@@ -6,6 +6,7 @@ use super::{
 };
 use crate::config::{Config, ConfigError, PoseConfig, load, parse};
 use crate::dataset::{ClipSplit, Dataset, DatasetError, GarmentPurpose, load_body, purpose, read_body};
+use crate::run::difference::listed;
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use burn::tensor::Device;
 use clothcombo_data::asset::Body;
@@ -139,26 +140,14 @@ impl TrainedModel {
     ///
     /// # Errors
     /// Names the model when they do not.
-    pub fn check_fits(&self, dataset: &Dataset) -> Result<(), CheckpointError> {
-        let (expected, found) = (CheckpointState::of(dataset, 0), &self.state);
-        let fits = (&found.joints, found.shape_count, found.pose_features)
-            == (&expected.joints, expected.shape_count, expected.pose_features);
-        let reason = || {
-            format!(
-                "it was trained for {} joints, {} shape components and {} pose features, the data has {}, {} and {} (or other \
-                 joints)",
-                found.joints.len(),
-                found.shape_count,
-                found.pose_features,
-                expected.joints.len(),
-                expected.shape_count,
-                expected.pose_features
-            )
-        };
-        if fits {
-            Ok(())
-        } else {
-            Err(CheckpointError::Foreign { path: self.folder.clone(), reason: reason() })
+    fn check_fits(&self, dataset: &Dataset) -> Result<(), CheckpointError> {
+        let sizes = self.state.changed_sizes(&CheckpointState::of(dataset, 0), "model");
+        match sizes.is_empty() {
+            true => Ok(()),
+            false => {
+                let reason = format!("the data does not fit its networks:{}", listed(sizes));
+                Err(CheckpointError::Foreign { path: self.folder.clone(), reason })
+            }
         }
     }
 

@@ -26,14 +26,9 @@ impl<W: Write> EventFile<W> {
     /// The writer's.
     pub fn begin(file: W, first_step: u64) -> io::Result<Self> {
         let mut events = Self { file };
-        let mut version = Message::default();
-        version.bytes(3, b"brain.Event:2");
-        events.event(0, version)?;
-        let mut session = Message::default();
-        session.integer(1, 1); // SessionLog.status = START
-        let mut start = Message::default();
-        start.bytes(7, &session.0);
-        events.event(first_step, start)?;
+        events.event(0, ProtocolMessage::default().bytes(3, b"brain.Event:2"))?;
+        let session = ProtocolMessage::default().integer(1, 1); // SessionLog.status = START
+        events.event(first_step, ProtocolMessage::default().bytes(7, &session.0))?;
         Ok(events)
     }
 
@@ -42,13 +37,9 @@ impl<W: Write> EventFile<W> {
     /// # Errors
     /// The writer's.
     pub fn scalars<'a>(&mut self, step: u64, values: impl Iterator<Item = (&'a str, f64)>) -> io::Result<()> {
-        let mut summary = Message::default();
-        for (tag, value) in values {
-            let mut entry = Message::default();
-            entry.bytes(1, tag.as_bytes());
-            entry.float(2, value as f32);
-            summary.bytes(1, &entry.0);
-        }
+        let summary = values.fold(ProtocolMessage::default(), |summary, (tag, value)| {
+            summary.bytes(1, &ProtocolMessage::default().bytes(1, tag.as_bytes()).float(2, value as f32).0)
+        });
         self.summary(step, summary)
     }
 
@@ -57,17 +48,12 @@ impl<W: Write> EventFile<W> {
     /// # Errors
     /// The writer's.
     pub fn picture(&mut self, step: u64, tag: &str, png: &[u8], size: (u32, u32)) -> io::Result<()> {
-        let mut image = Message::default();
-        image.integer(1, u64::from(size.1));
-        image.integer(2, u64::from(size.0));
-        image.integer(3, 3); // RGB
-        image.bytes(4, png);
-        let mut entry = Message::default();
-        entry.bytes(1, tag.as_bytes());
-        entry.bytes(4, &image.0);
-        let mut summary = Message::default();
-        summary.bytes(1, &entry.0);
-        self.summary(step, summary)
+        let [width, height] = [size.0, size.1].map(u64::from);
+        let colours = 3; // RGB
+        let image =
+            ProtocolMessage::default().integer(1, height).integer(2, width).integer(3, colours).bytes(4, png);
+        let entry = ProtocolMessage::default().bytes(1, tag.as_bytes()).bytes(4, &image.0);
+        self.summary(step, ProtocolMessage::default().bytes(1, &entry.0))
     }
 
     /// Has the system write what was given so far.
@@ -78,18 +64,14 @@ impl<W: Write> EventFile<W> {
         self.file.flush()
     }
 
-    fn summary(&mut self, step: u64, summary: Message) -> io::Result<()> {
-        let mut what = Message::default();
-        what.bytes(5, &summary.0);
-        self.event(step, what)
+    fn summary(&mut self, step: u64, summary: ProtocolMessage) -> io::Result<()> {
+        self.event(step, ProtocolMessage::default().bytes(5, &summary.0))
     }
 
     /// Writes an event whose content is `what`.
-    fn event(&mut self, step: u64, what: Message) -> io::Result<()> {
+    fn event(&mut self, step: u64, what: ProtocolMessage) -> io::Result<()> {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64());
-        let mut event = Message::default();
-        event.double(1, now);
-        event.integer(2, step);
+        let mut event = ProtocolMessage::default().double(1, now).integer(2, step);
         event.0.extend(what.0);
         let length = (event.0.len() as u64).to_le_bytes();
         self.file.write_all(&length)?;
@@ -106,9 +88,9 @@ fn masked_checksum(data: &[u8]) -> [u8; 4] {
 
 /// A protocol-buffer message in the making.
 #[derive(Default)]
-struct Message(Vec<u8>);
+struct ProtocolMessage(Vec<u8>);
 
-impl Message {
+impl ProtocolMessage {
     fn variable(&mut self, mut value: u64) {
         while value >= 0x80 {
             self.0.push(value as u8 | 0x80);
@@ -121,25 +103,29 @@ impl Message {
         self.variable((field << 3) | wire);
     }
 
-    fn integer(&mut self, field: u64, value: u64) {
+    fn integer(mut self, field: u64, value: u64) -> Self {
         self.key(field, 0);
         self.variable(value);
+        self
     }
 
-    fn double(&mut self, field: u64, value: f64) {
+    fn double(mut self, field: u64, value: f64) -> Self {
         self.key(field, 1);
         self.0.extend(value.to_le_bytes());
+        self
     }
 
-    fn bytes(&mut self, field: u64, value: &[u8]) {
+    fn bytes(mut self, field: u64, value: &[u8]) -> Self {
         self.key(field, 2);
         self.variable(value.len() as u64);
         self.0.extend(value);
+        self
     }
 
-    fn float(&mut self, field: u64, value: f32) {
+    fn float(mut self, field: u64, value: f32) -> Self {
         self.key(field, 5);
         self.0.extend(value.to_le_bytes());
+        self
     }
 }
 

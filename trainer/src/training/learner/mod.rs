@@ -89,7 +89,8 @@ impl Learner {
     /// When a scene's tensors cannot be made.
     pub fn forward_backward(&mut self, input: &StepInput<'_>) -> Result<StepOutput, DrapeError> {
         self.freeze(input);
-        let step = SceneStep::new(input, self.clip, self.max_norm, self.frozen.as_ref().map(|f| &f.model));
+        let frozen = self.frozen.as_ref().map(|f| &f.model);
+        let step = SceneStep { input, clip: self.clip, max_norm: self.max_norm, frozen };
         let jobs =
             input.scenes.iter().map(|scene| Ok((scene, self.frozen_embeddings(input.tensors, scene)?)));
         let jobs = jobs.collect::<Result<Vec<_>, DrapeError>>()?;

@@ -21,11 +21,11 @@ type Job<'a> = (&'a PreparedScene, Option<Vec<GarmentEmbedding>>);
 /// What the scenes of a step have in common.
 #[derive(Clone, Copy)]
 pub(super) struct SceneStep<'a> {
-    input: &'a StepInput<'a>,
-    clip: ClipScope,
+    pub input: &'a StepInput<'a>,
+    pub clip: ClipScope,
     /// Largest norm of a clipped gradient; `None`: any.
-    max_norm: Option<f64>,
-    frozen: Option<&'a ClothCombo>,
+    pub max_norm: Option<f64>,
+    pub frozen: Option<&'a ClothCombo>,
 }
 
 /// Losses of a scene.
@@ -49,16 +49,7 @@ impl Losses {
     }
 }
 
-impl<'a> SceneStep<'a> {
-    pub fn new(
-        input: &'a StepInput<'a>,
-        clip: ClipScope,
-        max_norm: Option<f64>,
-        frozen: Option<&'a ClothCombo>,
-    ) -> Self {
-        Self { input, clip, max_norm, frozen }
-    }
-
+impl SceneStep<'_> {
     /// Every scene on its share of the threads, as few operations of a scene are large enough for all of them.
     ///
     /// burn keeps all operations on the same parameters in one graph under one lock, so that each scene gets a copy of the

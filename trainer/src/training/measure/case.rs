@@ -45,12 +45,8 @@ impl Case {
     pub fn config(&self, overrides: &[String]) -> Result<Config, ConfigError> {
         let Self { vertices, layers, width, blocks, eigen_count, bodies, trains } = *self;
         let skinning_width = width.min(128);
-        let trains = match trains {
-            Trains::Single => "single",
-            Trains::Draping => "draping",
-            Trains::Untangling => "untangling",
-            Trains::All => "all",
-        };
+        // Quoted, as TOML has it too.
+        let trains = serde_json::json!(trains);
         // Garments that reach the same parts of the body come first, so that even two layers touch.
         let text = format!(
             r#"
@@ -72,7 +68,7 @@ impl Case {
             repulsion = {{ subset = 0 }}
             [[stages]]
             name = "measured"
-            trains = "{trains}"
+            trains = {trains}
             steps = 1000000
             layers = [{layers}, {layers}]
             bodies = {bodies}

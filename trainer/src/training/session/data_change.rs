@@ -15,7 +15,7 @@ pub(super) fn changed_data(
     allowed: &AllowedChanges,
 ) -> Result<Vec<DataChange>, Report> {
     let (found, expected) = (&checkpoint.state, CheckpointState::of(dataset, 0));
-    let sizes = changed_sizes(found, &expected);
+    let sizes = found.changed_sizes(&expected, "checkpoint");
     if !sizes.is_empty() {
         return Err(miette!(
             help = "networks keep the inputs they were made for: restore data.body, data.shape_components and \
@@ -55,22 +55,4 @@ pub(super) fn changed_data(
         checkpoint.path.display(),
         listed(refused.iter().map(|change| &change.text))
     ))
-}
-
-/// In which inputs of the networks two states differ, in words.
-fn changed_sizes(found: &CheckpointState, now: &CheckpointState) -> Vec<String> {
-    let mut lines = Vec::new();
-    if found.joints != now.joints {
-        let [now, before] = [now, found].map(|state| state.joints.join(", "));
-        lines.push(format!("joints: {now} now; {before} in the checkpoint"));
-    }
-    for (name, now, before) in [
-        ("shape components", now.shape_count, found.shape_count),
-        ("numbers of a pose", now.pose_features, found.pose_features),
-    ] {
-        if now != before {
-            lines.push(format!("{name}: {now} now; {before} in the checkpoint"));
-        }
-    }
-    lines
 }
