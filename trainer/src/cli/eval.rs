@@ -7,7 +7,7 @@ use crate::cli::values::folder_to_make;
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::config::{Config, load};
 use crate::dataset::Dataset;
-use crate::evaluation::{Evaluation, ModelUnderTest, NamedModel, Page, SceneCounts, part_keys};
+use crate::evaluation::{Evaluation, EvaluationPage, ModelUnderTest, NamedModel, SceneCounts, part_keys};
 use crate::inference::shipped_model;
 use crate::run::checkpoint::TrainedModel;
 use crate::run::report::html::utc;
@@ -240,10 +240,10 @@ fn check_specific(specific: &[NamedModel], dataset: &Dataset) -> Result<(), Repo
     Ok(())
 }
 
-fn page(trained: &TrainedModel, evaluation: Evaluation, device: &Device, seconds: f64) -> Page {
+fn page(trained: &TrainedModel, evaluation: Evaluation, device: &Device, seconds: f64) -> EvaluationPage {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    Page {
+    EvaluationPage {
         title: format!("Evaluation of {}", trained.folder.display()),
         facts: vec![
             ("command", format!("clothcombo {}", arguments.join(" "))),
@@ -267,7 +267,7 @@ fn page(trained: &TrainedModel, evaluation: Evaluation, device: &Device, seconds
     }
 }
 
-fn write(folder: &Path, numbers: &Value, page: &Page) -> Result<(), Report> {
+fn write(folder: &Path, numbers: &Value, page: &EvaluationPage) -> Result<(), Report> {
     // First, because by this file a later evaluation recognises the folder as a report.
     let tables: Vec<_> =
         page.sections.iter().map(|s| json!({ "title": s.title, "tables": s.tables })).collect();

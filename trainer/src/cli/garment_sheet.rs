@@ -1,6 +1,8 @@
 //! A contact sheet: garments on the body they were made for, by category.
 
-use crate::picture::{BODY_COLOUR, Camera, Figure, Sheet, SheetRow, View, layer_colour, render_with_camera};
+use crate::picture::{
+    BODY_COLOUR, Camera, Figure, PictureSheet, SheetRow, View, layer_colour, render_with_camera,
+};
 use clothcombo_data::asset::{Body, Category, Garment};
 use image::RgbImage;
 
@@ -51,7 +53,7 @@ pub fn garment_sheet(body: &Body, garments: &[Garment]) -> RgbImage {
             cells: row.iter().map(|(_, picture)| picture.clone()).collect(),
         }
     });
-    Sheet { rows: rows.collect(), ..Sheet::default() }.compose()
+    PictureSheet { rows: rows.collect(), ..PictureSheet::default() }.compose()
 }
 
 #[cfg(test)]

@@ -15,9 +15,9 @@ pub(super) const EXTENDS: &str = "extends";
 const LONGEST_CHAIN: usize = 8;
 
 /// A chain of configurations, the extending one first. Places count bytes over all texts, one after the other.
-pub(super) struct Sources(Vec<Source>);
+pub(super) struct Sources(Vec<SourceText>);
 
-struct Source {
+struct SourceText {
     path: PathBuf,
     /// As many line ends as the texts before have bytes, so that the parser counts on from them; then the text.
     padded: String,
@@ -37,7 +37,7 @@ impl Sources {
         let mut next = Some((path.to_owned(), text.to_owned()));
         while let Some((path, text)) = next {
             let start = sources.0.last().map_or(0, |source| source.padded.len() + 1);
-            sources.0.push(Source { padded: "\n".repeat(start) + &text, path, start });
+            sources.0.push(SourceText { padded: "\n".repeat(start) + &text, path, start });
             next = sources.base()?;
         }
         Ok(sources)
@@ -67,7 +67,7 @@ impl Sources {
         }
     }
 
-    fn parsed<'a>(&self, source: &'a Source) -> Result<Spanned<DeTable<'a>>, ConfigError> {
+    fn parsed<'a>(&self, source: &'a SourceText) -> Result<Spanned<DeTable<'a>>, ConfigError> {
         DeTable::parse(&source.padded).map_err(|error| self.invalid(&error))
     }
 
@@ -99,22 +99,22 @@ impl Sources {
     fn span_of(&self, key: &str) -> Option<Range<usize>> {
         let tree = self.tree().ok();
         let mut found = None;
-        let mut node = tree.as_ref().map(Spanned::get_ref).map(Node::Table);
+        let mut node = tree.as_ref().map(Spanned::get_ref).map(TomlNode::Table);
         for part in key.split(['.', '[']) {
             let value = match (node, part.strip_suffix(']').map(str::parse::<usize>)) {
-                (Some(Node::Table(table)), None) => table.get(part),
-                (Some(Node::Value(DeValue::Table(table))), None) => table.get(part),
-                (Some(Node::Value(DeValue::Array(list))), Some(Ok(index))) => list.get(index),
+                (Some(TomlNode::Table(table)), None) => table.get(part),
+                (Some(TomlNode::Value(DeValue::Table(table))), None) => table.get(part),
+                (Some(TomlNode::Value(DeValue::Array(list))), Some(Ok(index))) => list.get(index),
                 _ => None,
             };
             let Some(value) = value else { break };
             found = Some(value.span());
-            node = Some(Node::Value(value.get_ref()));
+            node = Some(TomlNode::Value(value.get_ref()));
         }
         found
     }
 
-    fn source(&self, span: Option<&Range<usize>>) -> &Source {
+    fn source(&self, span: Option<&Range<usize>>) -> &SourceText {
         let begin = span.map_or(0, |span| span.start);
         self.0.iter().rev().find(|source| source.start <= begin).unwrap_or(&self.0[0])
     }
@@ -140,7 +140,7 @@ impl Sources {
 }
 
 #[derive(Clone, Copy)]
-enum Node<'a> {
+enum TomlNode<'a> {
     Table(&'a DeTable<'a>),
     Value(&'a DeValue<'a>),
 }

@@ -20,7 +20,7 @@ const MOST_GARMENTS: usize = 6;
 /// A body with fewer pairs in pinched regions before the post-process is called hardly pinched.
 const HARDLY_PINCHED: usize = 200;
 
-struct Outfit {
+struct PostProcessedOutfit {
     /// Names, inner → outer.
     garments: Vec<String>,
     is_feasible: bool,
@@ -55,20 +55,19 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
          before the post-process. Strain added: mean (median). Time: median (95th percentile), outfits in parallel, each on one thread."
     ));
     let text = "Garments of all sets in random order, in validation clips (held-out windows where there are none), on bodies of random shape.";
-    let numbers =
-        json!({ "groups": rows, "outfits": outfits.iter().map(Outfit::numbers).collect::<Vec<_>>() });
+    let numbers = json!({ "groups": rows, "outfits": outfits.iter().map(PostProcessedOutfit::numbers).collect::<Vec<_>>() });
     Ok(vec![Section::new("certificates", "Certificates of random outfits", text, numbers, vec![table])])
 }
 
 /// Drapes and resolves outfit `index`. Test clips stay unread: the post-process is tuned on these outfits.
-fn resolved(evaluator: &Evaluator<'_>, index: usize) -> Result<Outfit, Report> {
+fn resolved(evaluator: &Evaluator<'_>, index: usize) -> Result<PostProcessedOutfit, Report> {
     let Evaluator { model, networks, post_process, meshes, .. } = evaluator;
     let clips = HeldOut::ValidationClips;
     let poses = if model.dataset.poses.has(clips) { clips } else { HeldOut::Windows };
     let sample = model.sample([STREAM, index], &model.garments(), 1 + index % MOST_GARMENTS, poses);
     let scene = model.prepare(&sample)?;
     let draped = post_process.of(&scene, &networks.drape(&scene)?.posed);
-    let outfit = Outfit {
+    let outfit = PostProcessedOutfit {
         garments: model.names(&sample.garments),
         is_feasible: draped.is_feasible(),
         before: draped.certificate().into_diagnostic()?,
@@ -80,7 +79,7 @@ fn resolved(evaluator: &Evaluator<'_>, index: usize) -> Result<Outfit, Report> {
     Ok(outfit)
 }
 
-impl Outfit {
+impl PostProcessedOutfit {
     fn numbers(&self) -> Value {
         let [before, after] = [&self.before, &self.after.certificate]
             .map(|certificate| Certificate { remaining: Vec::new(), ..certificate.clone() });
@@ -95,9 +94,9 @@ impl Outfit {
 }
 
 /// Of outfits by their number of garments, of all, and of those that a post-process can be expected to clear.
-fn statistics(outfits: &[Outfit]) -> Vec<Value> {
-    let row = |name: String, belongs: &dyn Fn(&Outfit) -> bool| {
-        let chosen: Vec<&Outfit> = outfits.iter().filter(|outfit| belongs(outfit)).collect();
+fn statistics(outfits: &[PostProcessedOutfit]) -> Vec<Value> {
+    let row = |name: String, belongs: &dyn Fn(&PostProcessedOutfit) -> bool| {
+        let chosen: Vec<&PostProcessedOutfit> = outfits.iter().filter(|outfit| belongs(outfit)).collect();
         let after: Vec<&Resolved> = chosen.iter().map(|outfit| &outfit.after).collect();
         json!({
             "name": name,

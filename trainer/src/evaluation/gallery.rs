@@ -6,7 +6,7 @@ use super::{Evaluator, ModelUnderTest, Section};
 use crate::dataset::{BodySample, HeldOut, PreparedScene, SceneSample};
 use crate::inference::reference::ReferenceScene;
 use crate::inference::{Draped, RefineSteps, refine};
-use crate::picture::{LegendEntry, Sheet, SheetRow, View, layer_colour, png_bytes};
+use crate::picture::{LegendEntry, PictureSheet, SheetRow, View, layer_colour, png_bytes};
 use clothcombo_data::asset::{Category, Pose};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use image::RgbImage;
@@ -173,7 +173,7 @@ fn sheet(evaluator: &Evaluator<'_>, outfits: &[Outfit], columns: Vec<String>) ->
     let names = evaluator.model.names(named.map_or(&[], Vec::as_slice));
     let entry = |(i, name)| LegendEntry { colour: layer_colour(i), name };
     rows[0].legend = names.into_iter().enumerate().map(entry).collect();
-    Ok(Sheet { title: String::new(), columns, rows: rows.to_vec() }.compose())
+    Ok(PictureSheet { title: String::new(), columns, rows: rows.to_vec() }.compose())
 }
 
 /// An outfit draped, resolved and refined.

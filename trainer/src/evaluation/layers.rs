@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 /// Estimated before the post-process. Strain (J): mean over the garments of an outfit, which are no independent scenes.
 /// Violations: share of outer vertices, by the closest surface point.
-const BEFORE: [Metric<Outfit>; 5] = [
+const BEFORE: [Metric<LayeredOutfit>; 5] = [
     ("strain_of_single_garments", |outfit| mean(outfit.strain.iter().map(|[single, _]| *single))),
     ("strain_in_outfit", |outfit| mean(outfit.strain.iter().map(|[_, layered]| *layered))),
     ("order_violations_of_single_garments", |outfit| outfit.violations_of_single_garments),
@@ -32,7 +32,7 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count as f64
 }
 
-struct Outfit {
+struct LayeredOutfit {
     is_feasible: bool,
     /// Strain of every garment by itself and in the outfit (J).
     strain: Vec<[f64; 2]>,
@@ -70,7 +70,7 @@ fn evaluate(
     [scenes, resolved]: [usize; 2],
 ) -> Result<Value, Report> {
     let Evaluator { model, networks, post_process, settings, .. } = evaluator;
-    let outfit = |index: usize| -> Result<Outfit, Report> {
+    let outfit = |index: usize| -> Result<LayeredOutfit, Report> {
         let scene = model.prepare(&model.sample_outfit([100 + layers, index], layers))?;
         let drapes = drape_by(networks, &[Method::SingleGarments, Method::Network], &scene)?;
         let energy = &scene.bodies[0].energy;
@@ -78,7 +78,7 @@ fn evaluate(
         let strain = |raw: &TermMap<Option<f64>>| raw[Term::Strain].unwrap_or(0.0);
         let single_garments = post_process.of(&scene, &drapes[0].posed);
         let draped = post_process.of(&scene, &drapes[1].posed);
-        let outfit = Outfit {
+        let outfit = LayeredOutfit {
             is_feasible: draped.is_feasible(),
             strain: raw(&drapes[0])
                 .iter()
@@ -93,15 +93,15 @@ fn evaluate(
         Ok(outfit)
     };
     let outfits = map_single_threaded((0..scenes).collect(), outfit)?;
-    let all: Vec<&Outfit> = outfits.iter().collect();
-    let feasible: Vec<&Outfit> = outfits.iter().filter(|outfit| outfit.is_feasible).collect();
+    let all: Vec<&LayeredOutfit> = outfits.iter().collect();
+    let feasible: Vec<&LayeredOutfit> = outfits.iter().filter(|outfit| outfit.is_feasible).collect();
     let mut result = statistics(layers, &all);
     result["layers"] = json!(layers);
     result["feasible"] = statistics(layers, &feasible);
     Ok(result)
 }
 
-fn statistics(layers: usize, outfits: &[&Outfit]) -> Value {
+fn statistics(layers: usize, outfits: &[&LayeredOutfit]) -> Value {
     let resolved: Vec<&Resolved> = outfits.iter().filter_map(|outfit| outfit.after.as_ref()).collect();
     let strain_of = |layer: usize, which: usize| -> Vec<f64> {
         outfits.iter().map(|outfit| outfit.strain[layer][which]).collect()

@@ -31,7 +31,7 @@ mod variants;
 
 pub use evaluator::{NamedModel, Progress, SceneCounts};
 pub use model_under_test::ModelUnderTest;
-pub use page::Page;
+pub use page::EvaluationPage;
 pub use timing::median_ms;
 pub use validation::ValidationSet;
 

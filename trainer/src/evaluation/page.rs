@@ -46,7 +46,7 @@ pub struct Picture {
 }
 
 /// Everything, to be read.
-pub struct Page {
+pub struct EvaluationPage {
     /// Heading.
     pub title: String,
     /// What was measured, and the command that does it again.
@@ -55,7 +55,7 @@ pub struct Page {
     pub sections: Vec<Section>,
 }
 
-impl Page {
+impl EvaluationPage {
     /// As Markdown; pictures are files beside it.
     pub fn markdown(&self) -> String {
         let mut text = format!("# {}\n\n", self.title);

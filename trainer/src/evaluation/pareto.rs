@@ -9,7 +9,7 @@ use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::reference::{ReferenceScene, wide};
 use crate::inference::tensor_store::DrapeError;
 use crate::inference::{RefineSteps, refine};
-use crate::picture::chart::{Chart, ChartGrid, Line};
+use crate::picture::chart::{Chart, ChartGrid, ChartLine};
 use crate::picture::png_bytes;
 use crate::run::report::table::{Column, median_with_interval, plain};
 use crate::run::validation::Method;
@@ -72,7 +72,7 @@ const METRICS: [Metric<MethodSample>; 7] = [
 ];
 
 /// A state of the garments, and how long it took.
-struct State {
+struct TimedState {
     method: String,
     milliseconds: f64,
     positions: Vec<[f64; 3]>,
@@ -90,7 +90,8 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     ];
     let mut charts = single_garments.charts("one garment");
     charts.extend(outfits.charts(&format!("{LAYERS} garments")));
-    let legend = Line::legend(&FAMILIES.map(|(_, name)| Line { name: name.to_owned(), points: Vec::new() }));
+    let legend =
+        ChartLine::legend(&FAMILIES.map(|(_, name)| ChartLine { name: name.to_owned(), points: Vec::new() }));
     let charts = ChartGrid { title: "Speed against error".to_owned(), legend, charts };
     let numbers = json!({ "single_garments": single_garments, "outfits": outfits });
     let mut section = Section::new("pareto", "Speed against error", "", numbers, tables);
@@ -169,9 +170,9 @@ impl Comparison {
                 let mut points: Vec<_> = family.map(|p| (median(p, "milliseconds"), value(p))).collect();
                 // More steps may take no longer; a line that turns back is drawn with spikes.
                 points.sort_by(|a, b| a.0.total_cmp(&b.0));
-                Line { name: FAMILIES[index].1.to_owned(), points }
+                ChartLine { name: FAMILIES[index].1.to_owned(), points }
             };
-            let lines: Vec<Line> = (0..FAMILIES.len()).map(line).collect();
+            let lines: Vec<ChartLine> = (0..FAMILIES.len()).map(line).collect();
             Chart::of_lines(of, ["time (ms)", quantity], &lines)
         };
         vec![
@@ -183,13 +184,13 @@ impl Comparison {
 }
 
 /// Skinning, networks, networks with post-process.
-fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<State>, Report> {
+fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<TimedState>, Report> {
     let Evaluator { networks, post_process, settings, .. } = evaluator;
     // The garment is embedded in the first, unmeasured drape, as for the next frame of a motion.
     let timed = |method: &str, drape: &dyn Fn() -> Result<Draped, DrapeError>| {
         let milliseconds = median_ms(SECONDS, drape)?;
         let positions = wide(&drape()?.posed);
-        Ok::<_, DrapeError>(State { method: method.to_owned(), milliseconds, positions })
+        Ok::<_, DrapeError>(TimedState { method: method.to_owned(), milliseconds, positions })
     };
     let by = |method: Method| timed(method.name(), &|| Ok(drape_by(networks, &[method], scene)?.remove(0)));
     let mut states = vec![by(Method::Lbs)?, by(Method::LbsWithShapeTransfer)?];
@@ -202,7 +203,7 @@ fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<
     let resolved = post_process.of(scene, &draped.posed).resolved(settings)?.positions.concat();
     let milliseconds = network.milliseconds + 1e3 * clock.elapsed().as_secs_f64();
     states.push(network);
-    states.push(State { method: RESOLVED.into(), milliseconds, positions: resolved });
+    states.push(TimedState { method: RESOLVED.into(), milliseconds, positions: resolved });
     Ok(states)
 }
 
@@ -211,7 +212,7 @@ fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<
 fn solved(
     evaluator: &Evaluator<'_>,
     scene: &PreparedScene,
-    mut states: Vec<State>,
+    mut states: Vec<TimedState>,
 ) -> Result<(Vec<MethodSample>, Stop), Report> {
     let reference = ReferenceScene::new(&evaluator.model.config.losses, scene).into_diagnostic()?;
     let problem = Problem::new(&reference.energy).into_diagnostic()?;
@@ -228,7 +229,7 @@ fn solved(
         let (positions, _) =
             refine(&reference.energy, &resolved, RefineSteps::AtMost(steps)).into_diagnostic()?;
         let milliseconds = resolved_milliseconds + 1e3 * clock.elapsed().as_secs_f64();
-        states.push(State {
+        states.push(TimedState {
             method: format!("{RESOLVED} + {}", counted_steps(steps)),
             milliseconds,
             positions,
@@ -237,7 +238,7 @@ fn solved(
     let settings = SolverSettings::default();
     let mut iterations = SOLVER.into_iter().peekable();
     let mut add = |iterations: usize, milliseconds: f64, positions: &[[f64; 3]]| {
-        states.push(State {
+        states.push(TimedState {
             method: format!("solver, {}", counted_steps(iterations)),
             milliseconds: start_milliseconds + milliseconds,
             positions: positions.to_vec(),
@@ -256,7 +257,7 @@ fn solved(
         solve(&problem, &network, &settings, &mut |_| ControlFlow::Continue(())).into_diagnostic()?;
     let minimum = if from_network.energy() < from_start.energy() { &from_network } else { &from_start };
     let excess_of_lbs = problem.value(&lbs) - minimum.energy();
-    let sample = |State { method, milliseconds, positions }: State| {
+    let sample = |TimedState { method, milliseconds, positions }: TimedState| {
         let raw = reference.energy.raw(&positions, &positions).garments;
         let packed: Vec<[f32; 3]> = positions.iter().map(|p| p.map(|x| x as f32)).collect();
         let certificate = evaluator.post_process.of(scene, &packed).certificate().into_diagnostic()?;

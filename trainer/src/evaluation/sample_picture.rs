@@ -7,7 +7,7 @@ use crate::inference::Draped;
 use crate::inference::networks::Networks;
 use crate::inference::reference::wide;
 use crate::picture::{
-    BODY_COLOUR, Figure, LegendEntry, Sheet, SheetRow, View, layer_colour, render, save_png,
+    BODY_COLOUR, Figure, LegendEntry, PictureSheet, SheetRow, View, layer_colour, render, save_png,
 };
 use crate::run::validation::Method;
 use miette::{IntoDiagnostic, Report};
@@ -40,7 +40,7 @@ pub fn draw(
         }
     }
     let columns = methods.iter().flat_map(|m| VIEWS.map(|v| format!("{}, {}", m.name(), v.name()))).collect();
-    let sheet = Sheet { title: String::new(), columns, rows };
+    let sheet = PictureSheet { title: String::new(), columns, rows };
     save_png(&sheet.compose(), path).into_diagnostic()
 }
 

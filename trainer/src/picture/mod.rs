@@ -24,7 +24,7 @@ pub use outfits::{DressedRow, MeshSlices, draw_dressed};
 pub use palette::{BODY_COLOUR, LAYER_COLOURS, layer_colour};
 pub use render::{render, render_with_camera};
 pub use save::{png_bytes, save_png};
-pub use sheet::{LegendEntry, Sheet, SheetRow};
+pub use sheet::{LegendEntry, PictureSheet, SheetRow};
 
 use std::path::PathBuf;
 

@@ -7,7 +7,7 @@ use super::View;
 use super::figure::Figure;
 use super::palette::{BODY_COLOUR, layer_colour};
 use super::render::render;
-use super::sheet::{LegendEntry, Sheet, SheetRow};
+use super::sheet::{LegendEntry, PictureSheet, SheetRow};
 
 /// Width and height of one view (pixels).
 const CELL: [u32; 2] = [340, 540];
@@ -72,7 +72,7 @@ pub fn draw_dressed(title: &str, names: &[&str], rows: &[DressedRow<'_>]) -> Rgb
         }
     }
     let columns = VIEWS.iter().map(|view| view.name().to_owned()).collect();
-    Sheet { title: title.to_owned(), columns, rows: lines }.compose()
+    PictureSheet { title: title.to_owned(), columns, rows: lines }.compose()
 }
 
 fn draw_view(row: &DressedRow<'_>, view: View) -> RgbImage {

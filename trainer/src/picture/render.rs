@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::camera::{Camera, Projected, View};
 use super::figure::Figure;
-use super::shade::{Sample, Samples, shade};
+use super::shade::{SurfaceSample, SurfaceSamples, shade};
 
 /// Bands rasterised in parallel; fixed, because rounding inside a triangle depends on the band's origin.
 const BANDS: usize = 8;
@@ -48,7 +48,7 @@ pub fn render_with_camera(figures: &[Figure<'_>], camera: &Camera, size: [u32; 2
 
     let meshes: Vec<ProjectedMesh> =
         figures.par_iter().map(|figure| ProjectedMesh::new(figure, camera, sample_size)).collect();
-    let bands: Vec<(Buffer2d<Sample>, Buffer2d<f32>)> = (0..BANDS)
+    let bands: Vec<(Buffer2d<SurfaceSample>, Buffer2d<f32>)> = (0..BANDS)
         .into_par_iter()
         .map(|band| {
             let rows = band * sample_size[1] / BANDS..(band + 1) * sample_size[1] / BANDS;
@@ -56,7 +56,7 @@ pub fn render_with_camera(figures: &[Figure<'_>], camera: &Camera, size: [u32; 2
         })
         .collect();
 
-    let mut samples = Samples {
+    let mut samples = SurfaceSamples {
         size: sample_size,
         supersampling: supersampling as usize,
         pixels_per_metre: camera.pixels_per_metre(height * supersampling) as f32,
@@ -137,9 +137,9 @@ fn rasterise_band(
     meshes: &[ProjectedMesh],
     sample_size: [usize; 2],
     rows: std::ops::Range<usize>,
-) -> (Buffer2d<Sample>, Buffer2d<f32>) {
+) -> (Buffer2d<SurfaceSample>, Buffer2d<f32>) {
     let size = [sample_size[0], rows.len()];
-    let mut surface = Buffer2d::new(size, Sample::BACKGROUND);
+    let mut surface = Buffer2d::new(size, SurfaceSample::BACKGROUND);
     let mut depth = Buffer2d::new(size, 1.0_f32);
     if rows.is_empty() {
         return (surface, depth);
@@ -156,7 +156,7 @@ fn rasterise_band(
             let corners: Vec<u32> = faces.iter().filter(is_inside).flatten().copied().collect();
             let pass = SurfacePass {
                 mesh,
-                figure: index.min(usize::from(Sample::MAX_FIGURE)) as u16,
+                figure: index.min(usize::from(SurfaceSample::MAX_FIGURE)) as u16,
                 is_back: side == 1,
                 middle: 0.5 * (top + bottom),
                 stretch: 2.0 / (top - bottom),
@@ -199,7 +199,7 @@ impl Interpolate for Normal {
 impl Pipeline for SurfacePass<'_> {
     type Vertex = u32;
     type VsOut = Normal;
-    type Pixel = Sample;
+    type Pixel = SurfaceSample;
 
     #[inline(always)]
     fn vert(&self, &vertex: &u32) -> ([f32; 4], Normal) {
@@ -211,8 +211,8 @@ impl Pipeline for SurfacePass<'_> {
     }
 
     #[inline(always)]
-    fn frag(&self, normal: &Normal) -> Sample {
-        Sample::new(self.figure, self.is_back, normal.0)
+    fn frag(&self, normal: &Normal) -> SurfaceSample {
+        SurfaceSample::new(self.figure, self.is_back, normal.0)
     }
 }
 

@@ -27,14 +27,14 @@ const BACKGROUND: [[f32; 3]; 2] = [[243.0, 243.0, 241.0], [216.0, 219.0, 222.0]]
 
 /// What a sample of the picture shows: figure, side and normal in six bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Sample {
+pub(super) struct SurfaceSample {
     /// x and y of the unit normal turned to the camera, 32767 = 1.
     normal: [i16; 2],
     /// Figure index × 2 + (1 for the back of the surface).
     surface: u16,
 }
 
-impl Sample {
+impl SurfaceSample {
     /// No figure.
     pub(super) const BACKGROUND: Self = Self { normal: [0; 2], surface: u16::MAX };
     /// Figures beyond this one share its number.
@@ -71,7 +71,7 @@ impl Sample {
 }
 
 /// A rasterised picture before lighting.
-pub(super) struct Samples {
+pub(super) struct SurfaceSamples {
     /// Width and height (samples).
     pub(super) size: [usize; 2],
     /// Samples per pixel along each axis.
@@ -79,13 +79,13 @@ pub(super) struct Samples {
     /// Samples per metre.
     pub(super) pixels_per_metre: f32,
     /// Row-major.
-    pub(super) surface: Vec<Sample>,
+    pub(super) surface: Vec<SurfaceSample>,
     /// Distance towards the camera (m), row-major.
     pub(super) height: Vec<f32>,
 }
 
 /// Lights the visible samples and averages them, in linear light, to pixels.
-pub(super) fn shade(samples: &Samples, colours: &[[u8; 3]]) -> RgbImage {
+pub(super) fn shade(samples: &SurfaceSamples, colours: &[[u8; 3]]) -> RgbImage {
     let factor = samples.supersampling;
     let (width, height) = (samples.size[0] / factor, samples.size[1] / factor);
     let palette: Vec<[[f32; 3]; 2]> = colours.iter().map(|&colour| sides(colour)).collect();
@@ -161,7 +161,7 @@ fn contact_offsets(pixels_per_metre: f32) -> [Vec<[i32; 2]>; 4] {
 }
 
 /// Share of the light from around that reaches a sample: 1 in the open, less in folds and next to a nearer layer.
-fn contact(samples: &Samples, offsets: &[Vec<[i32; 2]>; 4], x: usize, y: usize) -> f32 {
+fn contact(samples: &SurfaceSamples, offsets: &[Vec<[i32; 2]>; 4], x: usize, y: usize) -> f32 {
     let [width, height] = samples.size;
     let here = samples.height[y * width + x];
     let normal = samples.surface[y * width + x].normal();
@@ -189,7 +189,7 @@ fn contact(samples: &Samples, offsets: &[Vec<[i32; 2]>; 4], x: usize, y: usize) 
 }
 
 /// [`OUTLINE_LIGHT`] on samples beside another figure or beside a step of one figure; 1 elsewhere.
-fn outline(samples: &Samples, x: usize, y: usize) -> f32 {
+fn outline(samples: &SurfaceSamples, x: usize, y: usize) -> f32 {
     let [width, height] = samples.size;
     let index = y * width + x;
     let (here, depth) = (samples.surface[index], samples.height[index]);
@@ -268,23 +268,25 @@ mod tests {
 
     #[test]
     fn samples_keep_figure_side_and_normal() {
-        for (figure, is_back, sign) in [(0, false, 1.0), (3, true, -1.0), (Sample::MAX_FIGURE, true, -1.0)] {
-            let sample = Sample::new(figure, is_back, [0.9 * sign, -1.2 * sign, 2.0 * sign]);
+        for (figure, is_back, sign) in
+            [(0, false, 1.0), (3, true, -1.0), (SurfaceSample::MAX_FIGURE, true, -1.0)]
+        {
+            let sample = SurfaceSample::new(figure, is_back, [0.9 * sign, -1.2 * sign, 2.0 * sign]);
             assert!(!sample.is_background());
             assert_eq!((sample.figure(), sample.is_back()), (figure, is_back));
             let [x, y, z] = sample.normal();
             assert!((x - 0.36).abs() < 1e-3 && (y + 0.48).abs() < 1e-3 && (z - 0.8).abs() < 1e-3);
         }
-        let undefined = Sample::new(1, false, [f32::NAN, 0.0, 1.0]);
+        let undefined = SurfaceSample::new(1, false, [f32::NAN, 0.0, 1.0]);
         assert!(undefined.normal().iter().all(|x| x.is_finite()));
     }
 
     #[test]
     fn a_step_shades_the_lower_side_only() {
         let size = [64, 64];
-        let surface = vec![Sample::new(0, false, [0.0, 0.0, 1.0]); 64 * 64];
+        let surface = vec![SurfaceSample::new(0, false, [0.0, 0.0, 1.0]); 64 * 64];
         let height = (0..64 * 64).map(|i| if i % 64 < 32 { 0.0 } else { 0.02 }).collect();
-        let samples = Samples { size, supersampling: 2, pixels_per_metre: 400.0, surface, height };
+        let samples = SurfaceSamples { size, supersampling: 2, pixels_per_metre: 400.0, surface, height };
         let offsets = contact_offsets(samples.pixels_per_metre);
         let openness = |x| {
             let mut sum = 0.0;

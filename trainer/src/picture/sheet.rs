@@ -35,7 +35,7 @@ pub struct SheetRow {
 
 /// A grid of pictures with a title and a heading per column.
 #[derive(Clone, Debug, Default)]
-pub struct Sheet {
+pub struct PictureSheet {
     /// First line; none if empty.
     pub title: String,
     /// Headings; a row may have more or fewer cells.
@@ -44,7 +44,7 @@ pub struct Sheet {
     pub rows: Vec<SheetRow>,
 }
 
-impl Sheet {
+impl PictureSheet {
     /// Draws the sheet. Columns are as wide as their widest picture, rows as high as their highest one; a label too
     /// long for its place ends in an ellipsis. An empty sheet is a small empty picture.
     pub fn compose(&self) -> RgbImage {
@@ -134,7 +134,7 @@ mod tests {
     fn every_cell_is_whole_on_the_sheet_and_labels_do_not_cover_it() {
         let cell = |width, height| RgbImage::from_pixel(width, height, CELL);
         let legend = vec![LegendEntry { colour: [1, 2, 3], name: "skirt".into() }];
-        let sheet = Sheet {
+        let sheet = PictureSheet {
             title: "step 100".into(),
             columns: vec!["LBS".into(), "a heading too long for its column".into()],
             rows: vec![
@@ -152,11 +152,12 @@ mod tests {
     fn a_legend_that_does_not_fit_is_left_out_and_emptiness_is_drawn() {
         let entry = LegendEntry { colour: [1, 2, 3], name: "a very long name of a garment".into() };
         let row = SheetRow { label: "scene".into(), legend: vec![entry], cells: vec![RgbImage::new(90, 20)] };
-        let picture = Sheet { rows: vec![row], ..Sheet::default() }.compose();
+        let picture = PictureSheet { rows: vec![row], ..PictureSheet::default() }.compose();
         assert_eq!(count(&picture, Rgb([1, 2, 3])), 0);
-        let empty = Sheet::default().compose();
+        let empty = PictureSheet::default().compose();
         assert_eq!(count(&empty, PAPER), (empty.width() * empty.height()) as usize);
-        let only_labels = Sheet { title: "t".into(), columns: vec![], rows: vec![SheetRow::default()] };
+        let only_labels =
+            PictureSheet { title: "t".into(), columns: vec![], rows: vec![SheetRow::default()] };
         assert!(only_labels.compose().width() > 0);
     }
 }

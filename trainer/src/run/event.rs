@@ -1,6 +1,6 @@
 //! What the training loop says while it runs. The loop knows no progress bar, file or picture: observers do.
 
-use crate::run::checkpoint::Best;
+use crate::run::checkpoint::BestValidation;
 use crate::run::validation::ValidationReport;
 use clothcombo_physics::energy::Term;
 use miette::Report;
@@ -102,7 +102,7 @@ pub enum TrainEvent<'a> {
         /// The scores.
         report: &'a ValidationReport,
         /// The best one after a step so far.
-        best: Option<Best>,
+        best: Option<BestValidation>,
     },
     /// A checkpoint is about to be written: logs that must reach as far as it are to be flushed now.
     CheckpointDue,

@@ -1,6 +1,6 @@
 //! What a validation finds, as it stands in `validation.jsonl`: scores of methods over groups of scenes.
 
-use super::checkpoint::Best;
+use super::checkpoint::BestValidation;
 use super::spread::Spread;
 use clothcombo_physics::energy::Term;
 use serde::Serialize;
@@ -85,7 +85,7 @@ pub struct ValidationReport {
 
 impl ValidationReport {
     /// As it stands in `validation.jsonl`: the scores after `step` steps, and the best validation so far.
-    pub fn line(&self, step: u64, best: Option<Best>) -> Value {
+    pub fn line(&self, step: u64, best: Option<BestValidation>) -> Value {
         let best = best.map(|best| json!({ "step": best.step, "score": best.score.0 }));
         json!({ "step": step, "score": self.score(), "best": best, "groups": self.groups })
     }

@@ -40,7 +40,7 @@ struct Store {
     most: KeptBytes,
     clock: u64,
     sets: u64,
-    entries: HashMap<Place, Entry>,
+    entries: HashMap<Place, CacheEntry>,
 }
 
 /// Number of the set, index in it.
@@ -48,7 +48,7 @@ type Place = (u64, usize);
 type Value = Arc<dyn Any + Send + Sync>;
 
 #[derive(Debug)]
-struct Entry {
+struct CacheEntry {
     value: Value,
     bytes: usize,
     residence: Residence,
@@ -82,14 +82,14 @@ impl MemoryBudget {
 }
 
 impl Store {
-    fn count(&mut self, entry: &Entry, sign: fn(usize, usize) -> usize) {
+    fn count(&mut self, entry: &CacheEntry, sign: fn(usize, usize) -> usize) {
         self.kept.total = sign(self.kept.total, entry.bytes);
         if entry.residence == Residence::Device {
             self.kept.device = sign(self.kept.device, entry.bytes);
         }
     }
 
-    fn add(&mut self, place: Place, entry: Entry) -> Option<Value> {
+    fn add(&mut self, place: Place, entry: CacheEntry) -> Option<Value> {
         self.count(&entry, |kept, bytes| kept + bytes);
         self.entries.insert(place, entry).map(|old| {
             self.count(&old, |kept, bytes| kept - bytes);
@@ -105,7 +105,7 @@ impl Store {
 
     /// The value that was not used for longest among those that nobody holds; dropping the others would free nothing.
     fn oldest(&self, newest: Place, only_device: bool) -> Option<Place> {
-        let may_go = |(place, entry): &(&Place, &Entry)| {
+        let may_go = |(place, entry): &(&Place, &CacheEntry)| {
             **place != newest
                 && !(only_device && entry.residence == Residence::Host)
                 && Arc::strong_count(&entry.value) == 1
@@ -172,7 +172,8 @@ impl<T: Any + Send + Sync> LruCache<T> {
         let place = (self.set, index);
         let mut store = self.budget.lock();
         store.clock += 1;
-        let entry = Entry { value: value.clone(), bytes, residence: self.residence, last_use: store.clock };
+        let entry =
+            CacheEntry { value: value.clone(), bytes, residence: self.residence, last_use: store.clock };
         let replaced = store.add(place, entry);
         let dropped = store.shrink(place, self.budget.limits);
         // Freeing large values takes time that nobody need wait for.

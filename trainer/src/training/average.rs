@@ -29,26 +29,26 @@ impl Average {
         let steps = steps as f64;
         let decay = self.decay.min((1.0 + steps) / (10.0 + steps));
         // burn's container of tensors by parameter; nothing in it is a gradient here.
-        let mut weights = Collect(GradientsParams::new());
+        let mut weights = CollectWeights(GradientsParams::new());
         model.visit(&mut weights);
-        self.model = self.model.clone().map(&mut Blend { weights: weights.0, decay });
+        self.model = self.model.clone().map(&mut BlendWeights { weights: weights.0, decay });
     }
 }
 
-struct Collect(GradientsParams);
+struct CollectWeights(GradientsParams);
 
-impl ModuleVisitor for Collect {
+impl ModuleVisitor for CollectWeights {
     fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
         self.0.register::<D>(parameter.id, parameter.val().inner());
     }
 }
 
-struct Blend {
+struct BlendWeights {
     weights: GradientsParams,
     decay: f64,
 }
 
-impl ModuleMapper for Blend {
+impl ModuleMapper for BlendWeights {
     fn map_float<const D: usize>(&mut self, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let (id, value, mapper) = parameter.consume();
         let value = match self.weights.remove::<D>(id) {

@@ -18,7 +18,7 @@ pub struct Guard {
 
 /// What the guard makes of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Verdict {
+pub enum GuardVerdict {
     /// Nothing unusual.
     Fine,
     /// The gradient norm is far above the usual one.
@@ -58,14 +58,14 @@ impl Guard {
     }
 
     /// Takes note of step `step`; `skipped` if its loss or gradient was not finite.
-    pub fn watch(&mut self, step: u64, gradient_norm: f64, skipped: bool) -> Verdict {
+    pub fn watch(&mut self, step: u64, gradient_norm: f64, skipped: bool) -> GuardVerdict {
         while self.incidents.front().is_some_and(|first| first.saturating_add(self.config.window) <= step) {
             self.incidents.pop_front();
         }
         if skipped {
             self.incidents.push_back(step);
             let count = self.incidents.len();
-            return Verdict::Skipped { count, is_over: count >= self.config.max_incidents };
+            return GuardVerdict::Skipped { count, is_over: count >= self.config.max_incidents };
         }
         let usual = self.usual();
         // A scene in which nothing depends on what is trained has no gradient, and says nothing about that of others.
@@ -79,9 +79,9 @@ impl Guard {
             Some(usual)
                 if self.config.spike_factor > 0.0 && gradient_norm > self.config.spike_factor * usual =>
             {
-                Verdict::Spike { usual }
+                GuardVerdict::Spike { usual }
             }
-            _ => Verdict::Fine,
+            _ => GuardVerdict::Fine,
         }
     }
 
@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn incidents_count_within_the_window_only() {
         let mut guard = guard(3, 100);
-        let skipped = |count, is_over| Verdict::Skipped { count, is_over };
+        let skipped = |count, is_over| GuardVerdict::Skipped { count, is_over };
         assert_eq!(guard.watch(10, f64::NAN, true), skipped(1, false));
         assert_eq!(guard.watch(60, f64::NAN, true), skipped(2, false));
         assert_eq!(guard.watch(110, f64::NAN, true), skipped(2, false), "step 10 is out of the window");
@@ -121,15 +121,15 @@ mod tests {
     fn a_norm_far_above_the_median_is_a_spike() {
         let mut guard = guard(3, 100);
         for step in 0..50 {
-            assert_eq!(guard.watch(step, 1.0 + 0.1 * (step % 5) as f64, false), Verdict::Fine);
+            assert_eq!(guard.watch(step, 1.0 + 0.1 * (step % 5) as f64, false), GuardVerdict::Fine);
         }
         // Steps without a gradient change nothing, however many.
         for step in 50..150 {
-            assert_eq!(guard.watch(step, 0.0, false), Verdict::Fine);
+            assert_eq!(guard.watch(step, 0.0, false), GuardVerdict::Fine);
         }
-        assert_eq!(guard.watch(50, 11.0, false), Verdict::Fine);
+        assert_eq!(guard.watch(50, 11.0, false), GuardVerdict::Fine);
         assert!(
-            matches!(guard.watch(51, 13.0, false), Verdict::Spike { usual } if usual > 1.0 && usual < 1.4)
+            matches!(guard.watch(51, 13.0, false), GuardVerdict::Spike { usual } if usual > 1.0 && usual < 1.4)
         );
     }
 }

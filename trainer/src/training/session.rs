@@ -7,7 +7,7 @@ use crate::evaluation::ValidationSet;
 use crate::evaluation::sample_picture;
 use crate::inference::networks::Networks;
 use crate::inference::tensor_store::TensorStore;
-use crate::run::checkpoint::{Best, Checkpoint, CheckpointState, Snapshot};
+use crate::run::checkpoint::{BestValidation, Checkpoint, CheckpointState, Snapshot};
 use crate::run::folder::RunDir;
 use crate::run::memory::MemoryEstimate;
 use crate::run::validation::ValidationReport;
@@ -42,7 +42,7 @@ pub struct Session {
     learner: Learner,
     average: Option<Average>,
     guard: Guard,
-    best: Option<Best>,
+    best: Option<BestValidation>,
     step: u64,
     /// The last step that need not be saved any more.
     saved_step: u64,
@@ -130,7 +130,7 @@ impl Session {
         if self.best.is_some_and(|best| best.score.0 <= score) {
             return false;
         }
-        self.best = Some(Best { step: self.step, score: score.into() });
+        self.best = Some(BestValidation { step: self.step, score: score.into() });
         true
     }
 

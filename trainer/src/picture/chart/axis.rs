@@ -11,13 +11,13 @@ const MARGIN: f64 = 0.07;
 
 /// An axis over a fixed range.
 #[derive(Clone, Debug)]
-pub(crate) struct Axis {
+pub(crate) struct ChartAxis {
     low: f64,
     high: f64,
     is_logarithmic: bool,
 }
 
-impl Axis {
+impl ChartAxis {
     /// An axis over exactly this range; a range without extent is widened.
     pub(crate) fn linear(low: f64, high: f64) -> Self {
         let (low, high) = widened(low, high);
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn the_axis_is_logarithmic_only_where_that_helps() {
-        let fitting = |values: &[f64]| Axis::fitting(values.iter().copied());
+        let fitting = |values: &[f64]| ChartAxis::fitting(values.iter().copied());
         assert!(fitting(&[0.01, 5.0]).is_logarithmic);
         assert!(fitting(&[0.0, 0.01, 5.0]).is_logarithmic);
         assert!(!fitting(&[-0.01, 5.0]).is_logarithmic);
@@ -171,7 +171,7 @@ mod tests {
             (3.1, 9.9),
         ];
         for (low, high) in cases {
-            let axis = Axis::fitting([low, high].into_iter());
+            let axis = ChartAxis::fitting([low, high].into_iter());
             for count in [3, 5, 8] {
                 let ticks = axis.ticks(count);
                 assert!(ticks.len() >= 2 && ticks.len() <= count + 2, "{axis:?} {count}: {ticks:?}");

@@ -1,6 +1,6 @@
 //! Stacked bars: what a whole consists of, a bar per whole.
 
-use super::{Key, MARGIN, PAPER, SCALE, TEXT_SIZE, legend, legend_height};
+use super::{LegendKey, MARGIN, PAPER, SCALE, TEXT_SIZE, legend, legend_height};
 use crate::picture::palette::{LAYER_COLOURS, layer_colour};
 use crate::picture::svg::{css_colour, draw_elements, fitted, write_text};
 use image::RgbImage;
@@ -26,8 +26,8 @@ pub struct Bar {
 
 /// Draws a bar of equal length per whole, divided by the shares of its parts, under a legend of the `parts`' names.
 pub fn draw_bars(title: &str, parts: &[&str], bars: &[Bar]) -> RgbImage {
-    let keys: Vec<Key> =
-        parts.iter().enumerate().map(|(part, name)| Key::area(&colour(part), name)).collect();
+    let keys: Vec<LegendKey> =
+        parts.iter().enumerate().map(|(part, name)| LegendKey::area(&colour(part), name)).collect();
     let top = 30.0 + legend_height(&keys, WIDTH);
     let bottom = top + STEP * bars.len() as f64;
     let (left, length) = (MARGIN + LABEL, WIDTH - 2.0 * MARGIN - LABEL - TOTAL);

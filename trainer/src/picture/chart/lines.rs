@@ -1,23 +1,27 @@
 //! Measured quantities over a size.
 
-use super::axis::Axis;
-use super::{Chart, Key};
+use super::axis::ChartAxis;
+use super::{Chart, LegendKey};
 use crate::picture::layer_colour;
 use crate::picture::svg::css_colour;
 
 /// One measured quantity.
 #[derive(Clone, Debug, Default)]
-pub struct Line {
+pub struct ChartLine {
     /// What it is, with its unit.
     pub name: String,
     /// (size, value); points that are not finite are left out.
     pub points: Vec<(f64, f64)>,
 }
 
-impl Line {
+impl ChartLine {
     /// Keys of `lines`, for all charts that show them in this order.
-    pub fn legend(lines: &[Self]) -> Vec<Key> {
-        lines.iter().enumerate().map(|(i, line)| Key::line(&attributes("line", i), &line.name)).collect()
+    pub fn legend(lines: &[Self]) -> Vec<LegendKey> {
+        lines
+            .iter()
+            .enumerate()
+            .map(|(i, line)| LegendKey::line(&attributes("line", i), &line.name))
+            .collect()
     }
 }
 
@@ -27,11 +31,11 @@ fn attributes(class: &str, index: usize) -> String {
 
 impl Chart {
     /// Quantities that share both axes, which are logarithmic where the values spread widely; `axis_titles`: of the horizontal
-    /// and the vertical one. [`Line::legend`] says which is which.
-    pub fn of_lines(title: &str, axis_titles: [&str; 2], lines: &[Line]) -> Self {
+    /// and the vertical one. [`ChartLine::legend`] says which is which.
+    pub fn of_lines(title: &str, axis_titles: [&str; 2], lines: &[ChartLine]) -> Self {
         let drawable = |point: &&(f64, f64)| point.0.is_finite() && point.1.is_finite();
         let points = || lines.iter().flat_map(|line| &line.points).filter(drawable);
-        let axes = [Axis::fitting(points().map(|p| p.0)), Axis::fitting(points().map(|p| p.1))];
+        let axes = [ChartAxis::fitting(points().map(|p| p.0)), ChartAxis::fitting(points().map(|p| p.1))];
         let mut chart = Self::new(title, "", axes, Vec::new()).with_axis_titles(axis_titles);
         for (index, line) in lines.iter().enumerate() {
             let points: Vec<(f64, f64)> = line.points.iter().filter(drawable).copied().collect();
@@ -54,19 +58,19 @@ mod tests {
 
     #[test]
     fn every_line_is_drawn_in_its_colour_and_emptiness_is_said() {
-        let line = |factor: f64| Line {
+        let line = |factor: f64| ChartLine {
             name: format!("{factor} ms"),
             points: vec![(1e3, factor), (2e3, 2.0 * factor), (2e4, 20.0 * factor), (f64::NAN, 1.0)],
         };
         let lines = [line(1.0), line(3.0)];
-        let of = |title, lines: &[Line]| Chart::of_lines(title, ["vertices", "time (ms)"], lines);
+        let of = |title, lines: &[ChartLine]| Chart::of_lines(title, ["vertices", "time (ms)"], lines);
         let charts = vec![of("growth", &lines), of("none", &[])];
         let svg = charts[0].svg();
         assert!(!svg.contains("no data") && charts[1].svg().contains("no data"));
         assert!(
             svg.contains(">vertices</text>") && svg.contains(">time (ms)</text>") && !svg.contains("1 ms")
         );
-        let grid = ChartGrid { title: "growth".into(), legend: Line::legend(&lines), charts };
+        let grid = ChartGrid { title: "growth".into(), legend: ChartLine::legend(&lines), charts };
         let html = grid.html();
         assert_eq!((html.matches("1 ms</span>").count(), html.matches("<figure>").count()), (1, 2));
         let picture = grid.draw();

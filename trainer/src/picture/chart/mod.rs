@@ -6,12 +6,12 @@ mod lines;
 mod steps;
 
 pub use bars::{Bar, draw_bars};
-pub use lines::Line;
+pub use lines::ChartLine;
 pub(crate) use steps::median_of_last;
-pub use steps::{Baseline, StageBoundary, Steps};
+pub use steps::{Baseline, RunSteps, StageBoundary};
 
 use super::svg::{draw_elements, escape, fitted, text_width, write_text};
-use axis::Axis;
+use axis::ChartAxis;
 use image::{Rgb, RgbImage};
 use std::fmt::Write;
 
@@ -43,10 +43,10 @@ pub struct Chart {
     unit: String,
     /// Where the marks end, as SVG text.
     latest: String,
-    axes: [Axis; 2],
+    axes: [ChartAxis; 2],
     /// Below the horizontal axis and beside the vertical one; none if empty.
     axis_titles: [String; 2],
-    legend: Vec<Key>,
+    legend: Vec<LegendKey>,
     /// Where the vertical axis ends.
     top: f64,
     /// Where the axes meet.
@@ -55,7 +55,7 @@ pub struct Chart {
 }
 
 impl Chart {
-    fn new(title: &str, unit: &str, axes: [Axis; 2], legend: Vec<Key>) -> Self {
+    fn new(title: &str, unit: &str, axes: [ChartAxis; 2], legend: Vec<LegendKey>) -> Self {
         let top = TOP + legend_height(&legend, SIZE[0]);
         let [title, unit] = [title, unit].map(str::to_owned);
         let (latest, axis_titles, marks) = (String::new(), [const { String::new() }; 2], String::new());
@@ -143,14 +143,14 @@ impl Chart {
 }
 
 /// What a mark stands for.
-pub struct Key {
+pub struct LegendKey {
     /// A sample of the mark.
     swatch: String,
     /// What it stands for.
     pub name: String,
 }
 
-impl Key {
+impl LegendKey {
     /// Width and height of a swatch.
     const SWATCH: [f64; 2] = [20.0, 10.0];
 
@@ -169,16 +169,16 @@ impl Key {
 }
 
 /// Keys as elements of a page.
-pub(crate) fn legend_html(keys: &[Key]) -> String {
+pub(crate) fn legend_html(keys: &[LegendKey]) -> String {
     keys.iter().map(|key| format!("<span>{}{}</span> ", key.svg(), escape(&key.name))).collect()
 }
 
 /// Corners of the swatches of a legend as wide as `width`, relative to the first, with a margin on both sides.
-fn legend_places(keys: &[Key], width: f64) -> Vec<[f64; 2]> {
+fn legend_places(keys: &[LegendKey], width: f64) -> Vec<[f64; 2]> {
     let [mut x, mut y] = [0.0; 2];
     keys.iter()
         .map(|key| {
-            let own = Key::SWATCH[0] + 5.0 + text_width(&key.name, TEXT_SIZE);
+            let own = LegendKey::SWATCH[0] + 5.0 + text_width(&key.name, TEXT_SIZE);
             if x > 0.0 && x + own > width - 2.0 * MARGIN {
                 [x, y] = [0.0, y + LINE_HEIGHT];
             }
@@ -188,15 +188,15 @@ fn legend_places(keys: &[Key], width: f64) -> Vec<[f64; 2]> {
         .collect()
 }
 
-fn legend_height(keys: &[Key], width: f64) -> f64 {
+fn legend_height(keys: &[LegendKey], width: f64) -> f64 {
     legend_places(keys, width).last().map_or(0.0, |[_, y]| y + LINE_HEIGHT + 4.0)
 }
 
-fn legend(keys: &[Key], [left, top]: [f64; 2], width: f64) -> String {
+fn legend(keys: &[LegendKey], [left, top]: [f64; 2], width: f64) -> String {
     let mut svg = String::new();
-    for (Key { swatch, name }, [x, y]) in keys.iter().zip(legend_places(keys, width)) {
+    for (LegendKey { swatch, name }, [x, y]) in keys.iter().zip(legend_places(keys, width)) {
         let _ = write!(svg, r#"<g transform="translate({:.1} {})">{swatch}"#, left + x, top + y);
-        write_text(&mut svg, "key", [Key::SWATCH[0] + 5.0, 8.5], TEXT_SIZE, name);
+        write_text(&mut svg, "key", [LegendKey::SWATCH[0] + 5.0, 8.5], TEXT_SIZE, name);
         svg += "</g>";
     }
     svg
@@ -214,7 +214,7 @@ pub struct ChartGrid {
     /// Above the charts.
     pub title: String,
     /// Under the title.
-    pub legend: Vec<Key>,
+    pub legend: Vec<LegendKey>,
     /// From left to right, then from top to bottom.
     pub charts: Vec<Chart>,
 }
@@ -275,8 +275,9 @@ mod tests {
     #[test]
     fn charts_fill_a_grid() {
         for (number, columns, rows) in [(1, 1, 1), (2, 2, 1), (3, 3, 1), (4, 2, 2), (9, 3, 3), (10, 3, 4)] {
-            let chart =
-                |_| Chart::of_lines("a", ["b", "c"], &[Line { name: "b".into(), points: vec![(1.0, 2.0)] }]);
+            let chart = |_| {
+                Chart::of_lines("a", ["b", "c"], &[ChartLine { name: "b".into(), points: vec![(1.0, 2.0)] }])
+            };
             let grid = ChartGrid {
                 title: "run".into(),
                 legend: Vec::new(),

@@ -1,7 +1,7 @@
 //! Quantities over the steps of a run.
 
-use super::axis::{Axis, number_text};
-use super::{Chart, Key};
+use super::axis::{ChartAxis, number_text};
+use super::{Chart, LegendKey};
 use crate::picture::svg::{escape, fitted, write_text};
 use std::fmt::Write;
 
@@ -33,7 +33,7 @@ pub struct Baseline {
 
 /// The steps of a run.
 #[derive(Clone, Debug)]
-pub struct Steps {
+pub struct RunSteps {
     /// Their number.
     pub total: u64,
     /// Where stages begin, ascending.
@@ -49,14 +49,14 @@ struct Bin {
     high: f64,
 }
 
-impl Steps {
-    /// What the marks of [`Steps::curve`] stand for.
-    pub fn legend() -> Vec<Key> {
+impl RunSteps {
+    /// What the marks of [`RunSteps::curve`] stand for.
+    pub fn legend() -> Vec<LegendKey> {
         vec![
-            Key::line(r#"class="curve""#, "median"),
-            Key::area(r#"class="band""#, "5th to 95th percentile"),
-            Key::line(r#"class="baseline""#, "LBS + shape transfer (validation)"),
-            Key::line(r#"class="stage""#, "stage begins"),
+            LegendKey::line(r#"class="curve""#, "median"),
+            LegendKey::area(r#"class="band""#, "5th to 95th percentile"),
+            LegendKey::line(r#"class="baseline""#, "LBS + shape transfer (validation)"),
+            LegendKey::line(r#"class="stage""#, "stage begins"),
         ]
     }
 
@@ -82,7 +82,7 @@ impl Steps {
         let baselines: Vec<_> = baselines.iter().map(drawable).collect();
         let lines = baselines.iter().flatten().map(|baseline| baseline.value);
         let values = low.iter().chain(&high).map(|point| point.1).chain(lines);
-        let mut chart = self.chart(title, unit, Axis::fitting(values), Vec::new());
+        let mut chart = self.chart(title, unit, ChartAxis::fitting(values), Vec::new());
         chart.area(r#"class="band""#, &high, &low);
         for (range, baseline) in self.stage_ranges().zip(&baselines) {
             if let Some(Baseline { value, .. }) = baseline {
@@ -107,7 +107,7 @@ impl Steps {
     pub fn stacked(&self, title: &str, unit: &str, parts: &[(&str, Vec<(f64, f64)>)]) -> Chart {
         let keys = parts.iter().enumerate().map(|(i, (name, points))| {
             let latest = number_text(latest(points).unwrap_or(0.0), 3);
-            Key::area(&format!(r#"class="part{i}""#), &format!("{name} {latest}"))
+            LegendKey::area(&format!(r#"class="part{i}""#), &format!("{name} {latest}"))
         });
         let bins: Vec<Vec<Bin>> = parts.iter().map(|(_, points)| self.bins(points)).collect();
         let ground = bins.iter().take(1).flatten().map(|b| (b.step, 0.0)).collect();
@@ -117,7 +117,7 @@ impl Steps {
             edges.push(sums.collect());
         }
         let top = edges.last().into_iter().flatten().map(|point| point.1).fold(0.0, f64::max);
-        let values = Axis::linear(0.0, if top > 0.0 { 1.07 * top } else { 1.0 });
+        let values = ChartAxis::linear(0.0, if top > 0.0 { 1.07 * top } else { 1.0 });
         let mut chart = self.chart(title, unit, values, keys.collect());
         for (i, edge) in edges.windows(2).enumerate() {
             chart.area(&format!(r#"class="part{i}""#), &edge[1], &edge[0]);
@@ -126,9 +126,9 @@ impl Steps {
     }
 
     /// A chart with the stages alone: a line where each begins, and its name above where there is space for it.
-    fn chart(&self, title: &str, unit: &str, values: Axis, legend: Vec<Key>) -> Chart {
+    fn chart(&self, title: &str, unit: &str, values: ChartAxis, legend: Vec<LegendKey>) -> Chart {
         let end = self.total.max(1) as f64;
-        let mut chart = Chart::new(title, unit, [Axis::linear(0.0, end), values], legend);
+        let mut chart = Chart::new(title, unit, [ChartAxis::linear(0.0, end), values], legend);
         chart.top += STAGE_LINE;
         for (StageBoundary { name, .. }, [step, end]) in self.stages.iter().zip(self.stage_ranges()) {
             let [x, bottom] = chart.place((step, f64::NEG_INFINITY));
@@ -207,7 +207,7 @@ mod tests {
 
     #[test]
     fn bins_hold_the_spread_of_their_part_and_no_nan() {
-        let steps = Steps { total: 2400, stages: Vec::new() };
+        let steps = RunSteps { total: 2400, stages: Vec::new() };
         let mut points: Vec<(f64, f64)> = (0..2400).map(|i| (f64::from(i), f64::from(i % 10))).collect();
         points[17].1 = f64::NAN;
         let bins = steps.bins(&points);
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn bins_of_a_short_run_ignore_outliers_in_the_median_and_show_them_in_the_band() {
-        let steps = Steps { total: 100, stages: Vec::new() };
+        let steps = RunSteps { total: 100, stages: Vec::new() };
         let mut points: Vec<(f64, f64)> =
             (0..100).map(|k| (f64::from(k), (f64::from(k) * 0.37).sin())).collect();
         points[50].1 = 1e9;
@@ -254,14 +254,14 @@ mod tests {
                     StageBoundary { step: 0.0, name: "one & two".into() },
                     StageBoundary { step: f64::NAN, name: "never".into() },
                 ];
-                let steps = Steps { total: 10, stages };
+                let steps = RunSteps { total: 10, stages };
                 let baselines = [value.map(|value| Baseline { value, is_comparable: true }), None];
                 let curve = steps.curve("a < b", "J", &points, &baselines);
                 let svg = curve.svg();
                 assert!(svg.contains("a &lt; b") && svg.contains("one &amp; two"));
                 assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
                 let charts = vec![curve, steps.stacked("b", "", &[("part", points.clone())])];
-                ChartGrid { title: "run".into(), legend: Steps::legend(), charts }.draw();
+                ChartGrid { title: "run".into(), legend: RunSteps::legend(), charts }.draw();
             }
         }
     }
@@ -273,7 +273,7 @@ mod tests {
         let stage = |step, name: &str| StageBoundary { step, name: name.into() };
         let first = [stage(0.0, "single")];
         let count = |more: &[StageBoundary], baseline: Option<f64>, colour: [u8; 3]| {
-            let steps = Steps { total: 400, stages: [&first, more].concat() };
+            let steps = RunSteps { total: 400, stages: [&first, more].concat() };
             let baselines = [baseline.map(|value| Baseline { value, is_comparable: true })];
             let charts = vec![steps.curve("strain", "J", &points, &baselines)];
             let picture = ChartGrid { title: "run".into(), legend: Vec::new(), charts }.draw();
@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn a_ratio_is_of_like_things_and_never_to_zero() {
-        let steps = Steps {
+        let steps = RunSteps {
             total: 40,
             stages: vec![
                 StageBoundary { step: 0.0, name: "single".into() },

@@ -19,7 +19,7 @@ mod state;
 mod trained;
 
 pub use error::CheckpointError;
-pub use state::{Best, CheckpointState};
+pub use state::{BestValidation, CheckpointState};
 pub use trained::{ModelFiles, TrainedModel};
 
 use crate::config::{Config, load, to_toml};

@@ -30,7 +30,7 @@ pub struct CheckpointState {
     pub data: Option<String>,
     /// The best validation so far.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub best: Option<Best>,
+    pub best: Option<BestValidation>,
     /// Recent steps that were skipped because their loss or gradient was not finite.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub incidents: Vec<u64>,
@@ -44,7 +44,7 @@ pub struct CheckpointState {
 /// The best validation of a run so far.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Best {
+pub struct BestValidation {
     /// Steps done when it was taken.
     pub step: u64,
     /// Its score: mean total loss of the networks, mean over the groups of scenes; less is better.
@@ -155,7 +155,7 @@ mod tests {
 
     fn state() -> CheckpointState {
         let mut state = CheckpointState::new(120, vec!["pelvis".into(), "spine".into()], 10, 198);
-        state.best = Some(Best { step: 100, score: Exact(0.1 + 0.2) });
+        state.best = Some(BestValidation { step: 100, score: Exact(0.1 + 0.2) });
         state.checksums.insert("model.bpk".into(), "ab".into());
         state
     }

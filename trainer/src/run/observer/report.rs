@@ -3,12 +3,12 @@
 use super::history::SharedHistory;
 use crate::config::{Config, StageConfig, stage_starts, to_toml};
 use crate::dataset::{DataCheck, LicenceLine};
-use crate::picture::chart::{ChartGrid, StageBoundary, Steps};
+use crate::picture::chart::{ChartGrid, RunSteps, StageBoundary};
 use crate::picture::save_png;
 use crate::run::event::{Observer, TrainEvent};
 use crate::run::folder::RunDir;
 use crate::run::memory::MemoryEstimate;
-use crate::run::report::{Page, RunState, StageBaseline, charts, run_name};
+use crate::run::report::{RunPage, RunState, StageBaseline, charts, run_name};
 use crate::system::memory::Memory;
 use clothcombo_data::format::atomic;
 use miette::{IntoDiagnostic, Report, WrapErr};
@@ -22,7 +22,7 @@ pub struct ReportObserver {
     name: String,
     config: String,
     device: String,
-    steps: Steps,
+    steps: RunSteps,
     baselines: Vec<StageBaseline>,
     licences: Vec<LicenceLine>,
     memory: Option<MemoryEstimate>,
@@ -71,7 +71,7 @@ impl ReportObserver {
         let history = self.history.borrow();
         let (start, first) = self.session;
         let done = history.last.as_ref().map_or(0, |(step, _)| step.saturating_sub(first));
-        let page = Page {
+        let page = RunPage {
             name: &self.name,
             state,
             steps: &self.steps,
@@ -94,7 +94,8 @@ impl ReportObserver {
     fn draw_curves(&self) -> Result<(), Report> {
         let charts =
             charts(&self.history.borrow(), &self.steps, &self.baselines).into_iter().map(|(_, chart)| chart);
-        let grid = ChartGrid { title: "Training".into(), legend: Steps::legend(), charts: charts.collect() };
+        let grid =
+            ChartGrid { title: "Training".into(), legend: RunSteps::legend(), charts: charts.collect() };
         save_png(&grid.draw(), &self.curves).into_diagnostic()
     }
 }
@@ -106,11 +107,11 @@ fn warned_files(check: &Path) -> usize {
 }
 
 /// The steps of a run that `config` asks for.
-fn steps(config: &Config) -> Steps {
+fn steps(config: &Config) -> RunSteps {
     let stages = stage_starts(&config.stages).zip(&config.stages);
     let boundary =
         |(step, stage): (u64, &StageConfig)| StageBoundary { step: step as f64, name: stage.name.clone() };
-    Steps { total: config.total_steps(), stages: stages.map(boundary).collect() }
+    RunSteps { total: config.total_steps(), stages: stages.map(boundary).collect() }
 }
 
 impl Observer for ReportObserver {

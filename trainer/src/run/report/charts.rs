@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::dataset::ValidationGroup;
-use crate::picture::chart::{Baseline, Chart, Steps};
+use crate::picture::chart::{Baseline, Chart, RunSteps};
 use crate::run::event::StepRecord;
 use crate::run::observer::History;
 use clothcombo_physics::energy::Term;
@@ -40,7 +40,7 @@ impl StageBaseline {
 /// Name and chart of every quantity.
 pub(crate) fn charts(
     history: &History,
-    steps: &Steps,
+    steps: &RunSteps,
     stages: &[StageBaseline],
 ) -> Vec<(&'static str, Chart)> {
     let draw = |name: &'static str, title: &str, unit: &str| {
@@ -56,7 +56,7 @@ pub(crate) fn charts(
 }
 
 /// Where the time of a step goes.
-fn time_split(history: &History, steps: &Steps) -> Chart {
+fn time_split(history: &History, steps: &RunSteps) -> Chart {
     let milliseconds = |name: &str| -> Vec<(f64, f64)> {
         history.points(name).iter().map(|(step, s)| (*step, 1000.0 * s)).collect()
     };

@@ -9,7 +9,7 @@ pub(super) use charts::charts;
 
 use crate::dataset::LicenceLine;
 use crate::picture::chart::axis::number_text;
-use crate::picture::chart::{Steps, legend_html, median_of_last};
+use crate::picture::chart::{RunSteps, legend_html, median_of_last};
 use crate::run::memory::MemoryEstimate;
 use crate::run::observer::History;
 use crate::system::memory::gibibytes;
@@ -44,13 +44,13 @@ impl RunState {
 }
 
 /// What the page is made of.
-pub struct Page<'a> {
+pub struct RunPage<'a> {
     /// Name of the run.
     pub name: &'a str,
     /// Where it stands.
     pub state: RunState,
     /// The steps of the run and its stages.
-    pub steps: &'a Steps,
+    pub steps: &'a RunSteps,
     /// What every stage is compared with.
     pub baselines: &'a [StageBaseline],
     /// When this page was made (s since 1970).
@@ -97,7 +97,7 @@ fn hundredths_of_percent(share: &Value) -> String {
     share.as_f64().map_or("–".to_owned(), |share| format!("{:.2}", 100.0 * share))
 }
 
-impl Page<'_> {
+impl RunPage<'_> {
     /// The page.
     pub fn html(&self) -> String {
         // A page that is still being written looks for its next version.
@@ -158,7 +158,7 @@ impl Page<'_> {
     }
 
     fn curves(&self) -> String {
-        let keys = legend_html(&Steps::legend());
+        let keys = legend_html(&RunSteps::legend());
         let figures: String = charts(self.history, self.steps, self.baselines)
             .iter()
             .map(|(name, chart)| format!("<figure id=\"chart-{name}\">{}</figure>\n", chart.svg()))

@@ -3,7 +3,7 @@
 use super::Session;
 use crate::dataset::PreparedScene;
 use crate::run::event::{Observers, StepRecord, TrainEvent, emit};
-use crate::training::guard::Verdict;
+use crate::training::guard::GuardVerdict;
 use crate::training::learner::StepOutput;
 use crate::training::schedule::ScheduleAt;
 use miette::Report;
@@ -15,7 +15,7 @@ impl Session {
     /// When too many steps were skipped, or an incident cannot be written.
     pub fn react(
         &mut self,
-        verdict: Verdict,
+        verdict: GuardVerdict,
         record: &StepRecord,
         at: &ScheduleAt,
         (scenes, output): (Vec<PreparedScene>, StepOutput),
@@ -23,11 +23,11 @@ impl Session {
     ) -> Result<(), Report> {
         let step = self.step;
         match verdict {
-            Verdict::Fine => Ok(()),
-            Verdict::Spike { usual } => {
+            GuardVerdict::Fine => Ok(()),
+            GuardVerdict::Spike { usual } => {
                 emit(observers, &TrainEvent::Spike { step, norm: record.grad_norm, usual })
             }
-            Verdict::Skipped { count, is_over } => {
+            GuardVerdict::Skipped { count, is_over } => {
                 let incident = match self.is_rank_zero() {
                     true => self.keep_incident(at, scenes, output)?,
                     false => None,

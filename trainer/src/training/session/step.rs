@@ -5,7 +5,7 @@ use crate::config::Injected;
 use crate::dataset::PreparedScene;
 use crate::run::event::StepRecord;
 use crate::system::stop::StopFlag;
-use crate::training::guard::Verdict;
+use crate::training::guard::GuardVerdict;
 use crate::training::incident::spoil_position;
 use crate::training::learner::{StepInput, StepOutput};
 use crate::training::process_group::FailedElsewhere;
@@ -118,7 +118,7 @@ impl Session {
         output: &StepOutput,
         start: Instant,
         waited: Duration,
-    ) -> Verdict {
+    ) -> GuardVerdict {
         let verdict = self.guard.watch(self.step, output.gradient_norm, output.skipped);
         record.grad_norm = output.gradient_norm;
         record.seconds = start.elapsed().as_secs_f64();
@@ -127,7 +127,7 @@ impl Session {
         record.backward_seconds = output.times.backward.as_secs_f64();
         record.update_seconds = output.times.update.as_secs_f64();
         record.skipped = output.skipped;
-        record.spike = matches!(verdict, Verdict::Spike { .. });
+        record.spike = matches!(verdict, GuardVerdict::Spike { .. });
         verdict
     }
 }
