@@ -23,11 +23,13 @@ struct Case {
 }
 
 fn cases() -> Vec<Case> {
-    let poses = folded_poses().into_iter().map(|(name, pose)| (name.to_owned(), 1, None, Some(pose)));
-    let shapes = [-5.0, 5.0].map(|beta| (format!("all shapes at β = {beta:+}"), 1, Some(beta), None));
-    let layers = [("12 layers".to_owned(), 12, None, None)];
-    let cases = poses.chain(shapes).chain(layers);
-    cases.map(|(name, layers, shape, pose)| Case { name, layers, shape, pose }).collect()
+    let case = |name: String| Case { name, layers: 1, shape: None, pose: None };
+    let poses =
+        folded_poses().into_iter().map(|(name, pose)| Case { pose: Some(pose), ..case(name.to_owned()) });
+    let shapes =
+        [-5.0, 5.0].map(|beta| Case { shape: Some(beta), ..case(format!("all shapes at β = {beta:+}")) });
+    let layers = [Case { layers: 12, ..case("12 layers".to_owned()) }];
+    poses.chain(shapes).chain(layers).collect()
 }
 
 pub fn scene_count(evaluator: &Evaluator<'_>) -> usize {

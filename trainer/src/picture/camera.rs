@@ -102,17 +102,7 @@ impl Camera {
         let framed = figures.iter().find(|figure| figure.positions.iter().any(|p| is_finite(&p)));
         let points = || framed.into_iter().flat_map(|figure| figure.positions.iter().filter(is_finite));
 
-        let mut low = [f64::INFINITY; 3];
-        let mut high = [f64::NEG_INFINITY; 3];
-        for p in points() {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(p[axis]);
-                high[axis] = high[axis].max(p[axis]);
-            }
-        }
-        if low[0] > high[0] {
-            (low, high) = ([-1.0; 3], [1.0; 3]);
-        }
+        let [low, high] = bounds(points().copied()).unwrap_or([[-1.0; 3], [1.0; 3]]);
         let centre = std::array::from_fn(|axis| 0.5 * low[axis] + 0.5 * high[axis]);
         let half_diagonal = (0..3).map(|axis| (high[axis] - low[axis]).powi(2)).sum::<f64>().sqrt() / 2.0;
         let radius = half_diagonal.clamp(1e-6, 1e9);
@@ -127,24 +117,16 @@ impl Camera {
             window_half: [1.0; 2],
         };
 
-        let mut window_low = [f64::INFINITY; 2];
-        let mut window_high = [f64::NEG_INFINITY; 2];
         let is_near = |p: &&[f64; 3]| {
             (0..3).map(|k| (p[k] - centre[k]).powi(2)).sum::<f64>().sqrt() <= NEARBY_IN_RADII * radius
         };
         let others =
             figures.iter().flat_map(|figure| figure.positions.iter().filter(is_finite).filter(is_near));
-        for &p in points().chain(others) {
+        let seen = points().chain(others).map(|&p| {
             let [x, y, z] = camera.to_camera(p);
-            for (axis, value) in [x, y].into_iter().enumerate() {
-                let value = value / (camera.distance - z).max(camera.near);
-                window_low[axis] = window_low[axis].min(value);
-                window_high[axis] = window_high[axis].max(value);
-            }
-        }
-        if window_low[0] > window_high[0] {
-            (window_low, window_high) = ([-0.2; 2], [0.2; 2]);
-        }
+            [x, y].map(|value| value / (camera.distance - z).max(camera.near))
+        });
+        let [window_low, window_high] = bounds(seen).unwrap_or([[-0.2; 2], [0.2; 2]]);
         let half = |axis: usize| (window_high[axis] - window_low[axis]) / (2.0 * FILL);
         let vertical = half(1).max(half(0) / aspect).max(1e-9);
         camera.window_centre = std::array::from_fn(|axis| 0.5 * (window_low[axis] + window_high[axis]));
@@ -188,6 +170,15 @@ impl Camera {
     pub fn pixels_per_metre(&self, height: u32) -> f64 {
         f64::from(height) / (2.0 * self.window_half[1] * self.distance)
     }
+}
+
+/// The least and the largest value along every axis; none without points.
+fn bounds<const D: usize>(points: impl Iterator<Item = [f64; D]>) -> Option<[[f64; D]; 2]> {
+    let none = [[f64::INFINITY; D], [f64::NEG_INFINITY; D]];
+    let [low, high] = points.fold(none, |[low, high], p| {
+        [std::array::from_fn(|k| low[k].min(p[k])), std::array::from_fn(|k| high[k].max(p[k]))]
+    });
+    (low[0] <= high[0]).then_some([low, high])
 }
 
 #[cfg(test)]

@@ -13,11 +13,7 @@ impl Memory {
     /// What the system says now; `None` where it does not (only Linux does, in `/proc/self/status`).
     pub fn now() -> Option<Self> {
         let status = std::fs::read_to_string("/proc/self/status").ok()?;
-        let field = |name: &str| -> Option<u64> {
-            let line = status.lines().find_map(|l| l.strip_prefix(name))?;
-            Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
-        };
-        Some(Self { resident: field("VmRSS:")?, peak: field("VmHWM:")? })
+        Some(Self { resident: kilobytes(&status, "VmRSS:")?, peak: kilobytes(&status, "VmHWM:")? })
     }
 
     /// Makes the peak start again from what is in use now. Whether that worked (on Linux it does).
@@ -29,13 +25,17 @@ impl Memory {
 /// What the system can still give to this process (bytes): what it says is available, or what a control group (a container)
 /// allows at most; `None` where it does not say.
 pub fn available() -> Option<u64> {
-    let free = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
-        let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
-        Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
-    });
+    let free = std::fs::read_to_string("/proc/meminfo").ok();
+    let free = free.and_then(|text| kilobytes(&text, "MemAvailable:"));
     let allowed = std::fs::read_to_string("/sys/fs/cgroup/memory.max").ok();
     let allowed = allowed.and_then(|text| text.trim().parse::<u64>().ok());
     free.into_iter().chain(allowed).min()
+}
+
+/// The field `name` of a text of `/proc`, which has it in kB (bytes).
+fn kilobytes(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|l| l.strip_prefix(name))?;
+    Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
 }
 
 /// Bytes as GiB or MiB.

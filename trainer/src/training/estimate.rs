@@ -3,7 +3,7 @@
 use crate::config::Config;
 use crate::dataset::Dataset;
 use crate::inference::tensor_store::{DrapeError, TensorStore};
-use crate::training::learner::{Learner, StepInput, new_optimizer};
+use crate::training::learner::{Learner, StepInput};
 use crate::training::process_group::RankPartition;
 use crate::training::scenes::prepare_step;
 use crate::training::schedule::Schedule;
@@ -35,7 +35,7 @@ pub fn time_stages(
     let device = device.clone().autodiff();
     let model = ClothCombo::new(&config.model, &dataset.dimensions(), config.seed, &device)?;
     let tensors = TensorStore::new(dataset.clone(), dataset.dimensions(), &device);
-    let mut learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
+    let mut learner = Learner::fresh(model, &config.optimizer);
     let schedule = Schedule::new(config);
     let mut times = Vec::with_capacity(config.stages.len());
     for (first, stage) in schedule.boundaries().into_iter().zip(&config.stages) {

@@ -9,12 +9,10 @@
 use crate::config::{Config, ConfigError, Injected, Trains, parse, to_toml};
 use crate::dataset::{BodySample, Dataset, PreparedScene, SceneSample, prepare};
 use crate::inference::tensor_store::TensorStore;
-use crate::run::checkpoint::{checksum, save_model};
+use crate::run::checkpoint::{checksum, load_model, save_model};
 use crate::system::exact::Exact;
-use crate::training::learner::{Learner, StepInput, StepOutput, new_optimizer};
+use crate::training::learner::{Learner, StepInput, StepOutput};
 use crate::training::schedule::ScheduleAt;
-use burn::module::Module;
-use burn::store::ModuleRecord;
 use burn::tensor::Device;
 use clothcombo_data::asset::Pose;
 use clothcombo_data::format::atomic;
@@ -247,7 +245,7 @@ impl Incident {
             spoil_position(&mut scenes);
         }
         let tensors = TensorStore::new(dataset.clone(), dataset.dimensions(), &device);
-        let mut learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
+        let mut learner = Learner::fresh(model, &config.optimizer);
         let spoil = self.injected == Some(Injected::Gradient);
         let input = StepInput { spoil_gradient: spoil, ..StepInput::whole(&tensors, &scenes, self.trains) };
         let output = learner.train_step(&input, self.learning_rate.0)?;
@@ -272,11 +270,7 @@ impl Incident {
         if sum != self.weights_checksum {
             return Err(unusable("does not match its checksum".into()));
         }
-        let record = ModuleRecord::load(&file).map_err(|e| unusable(e.to_string()))?;
-        ClothCombo::new(&config.model, &dataset.dimensions(), 0, device)
-            .map_err(|e| unusable(e.to_string()))?
-            .try_load_record(record)
-            .map_err(|e| unusable(e.to_string()))
+        load_model(&file, &config.model, &dataset.dimensions(), device).flatten().map_err(unusable)
     }
 
     /// All numbers that a replay must reproduce, by name, in order.

@@ -31,7 +31,7 @@ use burn::optim::ModuleOptimizer;
 use burn::store::{ModuleRecord, ModuleSnapshot, SafetensorsStore};
 use burn::tensor::Device;
 use clothcombo_data::format::atomic::{self, Temporary};
-use clothcombo_model::ClothCombo;
+use clothcombo_model::{ClothCombo, Dimensions, ModelConfig};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -159,13 +159,13 @@ impl Checkpoint {
         device: &Device,
     ) -> Result<ClothCombo, CheckpointError> {
         let unusable = |reason: String| CheckpointError::Unusable { path: self.path.clone(), reason };
-        let record = ModuleRecord::load(self.path.join(file)).map_err(|e| unusable(e.to_string()))?;
-        let model = ClothCombo::new(&config.model, &self.state.dimensions(), 0, device)
-            .map_err(|e| unusable(e.to_string()))?;
-        model.try_load_record(record).map_err(|error| match self.config() {
+        let dimensions = self.state.dimensions();
+        let model =
+            load_model(&self.path.join(file), &config.model, &dimensions, device).map_err(unusable)?;
+        model.map_err(|error| match self.config() {
             // The files are those that were written: it is the configuration that asks for other networks.
             Ok(own) => match other_networks(config, &own) {
-                changes if changes.is_empty() => unusable(error.to_string()),
+                changes if changes.is_empty() => unusable(error),
                 changes => CheckpointError::OtherNetworks { path: self.path.clone(), changes },
             },
             Err(error) => error,
@@ -304,6 +304,21 @@ fn write(
 /// The reason, in words.
 pub(crate) fn save_model(model: &ClothCombo, path: &Path) -> Result<(), String> {
     model.clone().into_record().save(path).map_err(|e| e.to_string())
+}
+
+/// The networks whose exact parameters [`save_model`] wrote; or, within, why these are of networks of other sizes.
+///
+/// # Errors
+/// Why the file cannot be read or networks of these sizes not be made, in words.
+pub(crate) fn load_model(
+    path: &Path,
+    config: &ModelConfig,
+    dimensions: &Dimensions,
+    device: &Device,
+) -> Result<Result<ClothCombo, String>, String> {
+    let record = ModuleRecord::load(path).map_err(|e| e.to_string())?;
+    let model = ClothCombo::new(config, dimensions, 0, device).map_err(|e| e.to_string())?;
+    Ok(model.try_load_record(record).map_err(|e| e.to_string()))
 }
 
 /// BLAKE3 of a file, as hexadecimal text.

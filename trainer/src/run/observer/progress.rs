@@ -52,6 +52,12 @@ impl ProgressObserver {
         }
     }
 
+    fn abandon_bar(&mut self) {
+        if let Some(bar) = self.bar.take() {
+            bar.abandon();
+        }
+    }
+
     fn plain_line(&mut self, step: u64) {
         if self.last_line.elapsed() < PLAIN_INTERVAL {
             return;
@@ -150,15 +156,9 @@ impl Observer for ProgressObserver {
                     "stopped after step {step}; continue with --resume{}",
                     self.listed()
                 ));
-                if let Some(bar) = self.bar.take() {
-                    bar.abandon();
-                }
+                self.abandon_bar();
             }
-            TrainEvent::GaveUp { .. } => {
-                if let Some(bar) = self.bar.take() {
-                    bar.abandon();
-                }
-            }
+            TrainEvent::GaveUp { .. } => self.abandon_bar(),
             TrainEvent::Finished { step } => {
                 if let Some(bar) = self.bar.take() {
                     bar.finish();

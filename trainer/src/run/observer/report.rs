@@ -8,10 +8,10 @@ use crate::picture::save_png;
 use crate::run::event::{Observer, TrainEvent};
 use crate::run::folder::RunDir;
 use crate::run::memory::MemoryEstimate;
-use crate::run::report::{RunPage, RunState, StageBaseline, charts, run_name};
+use crate::run::report::{RunFacts, RunPage, RunState, StageBaseline, charts, run_name};
+use crate::system::files::write_file;
 use crate::system::memory::Memory;
-use clothcombo_data::format::atomic;
-use miette::{IntoDiagnostic, Report, WrapErr};
+use miette::{IntoDiagnostic, Report};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -19,14 +19,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 pub struct ReportObserver {
     path: PathBuf,
     curves: PathBuf,
-    name: String,
-    config: String,
-    device: String,
-    steps: RunSteps,
-    baselines: Vec<StageBaseline>,
-    licences: Vec<LicenceLine>,
-    memory: Option<MemoryEstimate>,
-    warned_files: usize,
+    facts: RunFacts,
     history: SharedHistory,
     every: Option<Duration>,
     written: Instant,
@@ -51,14 +44,16 @@ impl ReportObserver {
         Ok(Self {
             path: run.report(),
             curves: run.curves(),
-            name: run_name(run.root()),
-            config: to_toml(config).into_diagnostic()?,
-            device,
-            steps: steps(config),
-            baselines: StageBaseline::of_stages(config),
-            licences,
-            memory,
-            warned_files: warned_files(&run.data_check()),
+            facts: RunFacts {
+                name: run_name(run.root()),
+                config: to_toml(config).into_diagnostic()?,
+                device,
+                steps: steps(config),
+                baselines: StageBaseline::of_stages(config),
+                licences,
+                memory,
+                warned_files: warned_files(&run.data_check()),
+            },
             history,
             every: (every > 0.0).then(|| Duration::try_from_secs_f64(every).unwrap_or(Duration::MAX)),
             written: Instant::now(),
@@ -72,28 +67,19 @@ impl ReportObserver {
         let (start, first) = self.session;
         let done = history.last.as_ref().map_or(0, |(step, _)| step.saturating_sub(first));
         let page = RunPage {
-            name: &self.name,
+            facts: &self.facts,
             state,
-            steps: &self.steps,
-            baselines: &self.baselines,
             made: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()),
             speed: (done > 0).then(|| done as f64 / start.elapsed().as_secs_f64()),
             history: &history,
-            config: &self.config,
-            device: &self.device,
-            licences: &self.licences,
-            memory: self.memory,
-            warned_files: self.warned_files,
             peak: Memory::now().map(|m| m.peak),
         };
-        atomic::write(&self.path, page.html().as_bytes())
-            .into_diagnostic()
-            .wrap_err_with(|| format!("cannot write {}", self.path.display()))
+        write_file(&self.path, page.html().as_bytes())
     }
 
     fn draw_curves(&self) -> Result<(), Report> {
-        let charts =
-            charts(&self.history.borrow(), &self.steps, &self.baselines).into_iter().map(|(_, chart)| chart);
+        let RunFacts { steps, baselines, .. } = &self.facts;
+        let charts = charts(&self.history.borrow(), steps, baselines).into_iter().map(|(_, chart)| chart);
         let grid =
             ChartGrid { title: "Training".into(), legend: RunSteps::legend(), charts: charts.collect() };
         save_png(&grid.draw(), &self.curves).into_diagnostic()

@@ -43,32 +43,38 @@ impl RunState {
     }
 }
 
+/// What is known of a run from its start on.
+pub struct RunFacts {
+    /// Name of the run.
+    pub name: String,
+    /// The steps of the run and its stages.
+    pub steps: RunSteps,
+    /// What every stage is compared with.
+    pub baselines: Vec<StageBaseline>,
+    /// The configuration, as TOML.
+    pub config: String,
+    /// Name of the device it runs on.
+    pub device: String,
+    /// Terms of use of the data.
+    pub licences: Vec<LicenceLine>,
+    /// Memory expected at the start.
+    pub memory: Option<MemoryEstimate>,
+    /// Number of files of the data that `check.json` has warnings of.
+    pub warned_files: usize,
+}
+
 /// What the page is made of.
 pub struct RunPage<'a> {
-    /// Name of the run.
-    pub name: &'a str,
+    /// What is known from the start on.
+    pub facts: &'a RunFacts,
     /// Where it stands.
     pub state: RunState,
-    /// The steps of the run and its stages.
-    pub steps: &'a RunSteps,
-    /// What every stage is compared with.
-    pub baselines: &'a [StageBaseline],
     /// When this page was made (s since 1970).
     pub made: u64,
     /// Steps per second of this session.
     pub speed: Option<f64>,
     /// The logs.
     pub history: &'a History,
-    /// The configuration, as TOML.
-    pub config: &'a str,
-    /// Name of the device it runs on.
-    pub device: &'a str,
-    /// Terms of use of the data.
-    pub licences: &'a [LicenceLine],
-    /// Memory expected at the start.
-    pub memory: Option<MemoryEstimate>,
-    /// Number of files of the data that `check.json` has warnings of.
-    pub warned_files: usize,
     /// Most memory used so far (bytes).
     pub peak: Option<u64>,
 }
@@ -107,22 +113,23 @@ impl RunPage<'_> {
         };
         let config = format!(
             "<section id=\"config\"><h2>Configuration</h2><details><summary>every value used</summary><pre>{}</pre></details></section>\n",
-            escape(self.config)
+            escape(&self.facts.config)
         );
         let curves = self.curves();
         let parts = [self.header(), curves, self.validation(), self.samples(), self.licence_list(), config];
-        html::page(&format!("{} – {}", self.name, self.state.name()), refresh, &parts.concat())
+        html::page(&format!("{} – {}", self.facts.name, self.state.name()), refresh, &parts.concat())
     }
 
     fn header(&self) -> String {
         let step = self.history.last.as_ref().map_or(0, |(step, _)| *step);
         let stage = self.history.last.as_ref().map_or("", |(_, stage)| stage.as_str());
-        let percent = 100.0 * step as f64 / self.steps.total.max(1) as f64;
-        let mut tiles = vec![("step", format!("{step} of {}", self.steps.total)), ("stage", escape(stage))];
+        let percent = 100.0 * step as f64 / self.facts.steps.total.max(1) as f64;
+        let mut tiles =
+            vec![("step", format!("{step} of {}", self.facts.steps.total)), ("stage", escape(stage))];
         if let Some(speed) = self.speed.filter(|s| *s > 0.0) {
             tiles.push(("speed", format!("{} steps/s", number_text(speed, 3))));
             if self.state == RunState::Running {
-                let left = (self.steps.total.saturating_sub(step)) as f64 / speed;
+                let left = (self.facts.steps.total.saturating_sub(step)) as f64 / speed;
                 tiles.push(("time left", duration(left)));
             }
         }
@@ -132,15 +139,18 @@ impl RunPage<'_> {
         if let Some((step, score)) = self.history.best {
             tiles.push(("best validation", format!("{} at step {step}", number_text(score, 4))));
         }
-        tiles.push(("device", escape(self.device)));
+        tiles.push(("device", escape(&self.facts.device)));
         tiles.push(("skipped steps", self.history.skipped.len().to_string()));
         tiles.push(("gradient spikes", self.history.spikes.len().to_string()));
-        if self.warned_files > 0 {
-            tiles.push(("data", format!("warnings about {} files", self.warned_files)));
+        if self.facts.warned_files > 0 {
+            tiles.push(("data", format!("warnings about {} files", self.facts.warned_files)));
         }
         if let Some(peak) = self.peak {
-            let estimated =
-                self.memory.map(|m| format!(" (estimated {})", gibibytes(m.peak()))).unwrap_or_default();
+            let estimated = self
+                .facts
+                .memory
+                .map(|m| format!(" (estimated {})", gibibytes(m.peak())))
+                .unwrap_or_default();
             tiles.push(("peak memory", format!("{}{estimated}", gibibytes(peak))));
         }
         let tiles: String = tiles
@@ -150,7 +160,7 @@ impl RunPage<'_> {
         format!(
             "<header><h1>{} <span class=\"state {}\">{}</span></h1><p>as of {}</p>\
                 <div class=\"bar\"><i style=\"width:{percent:.1}%\"></i></div><div class=\"tiles\">{tiles}</div></header>\n",
-            escape(self.name),
+            escape(&self.facts.name),
             self.state.name().replace(' ', "-"),
             self.state.name(),
             utc(self.made)
@@ -159,7 +169,7 @@ impl RunPage<'_> {
 
     fn curves(&self) -> String {
         let keys = legend_html(&RunSteps::legend());
-        let figures: String = charts(self.history, self.steps, self.baselines)
+        let figures: String = charts(self.history, &self.facts.steps, &self.facts.baselines)
             .iter()
             .map(|(name, chart)| format!("<figure id=\"chart-{name}\">{}</figure>\n", chart.svg()))
             .collect();
@@ -201,7 +211,7 @@ impl RunPage<'_> {
         };
         let table = Table {
             head: ["data", "number", "licence", "author", "source"].map(str::to_owned).to_vec(),
-            rows: self.licences.iter().map(row).collect(),
+            rows: self.facts.licences.iter().map(row).collect(),
             ..Table::default()
         };
         format!("<section id=\"licences\"><h2>Data and licences</h2>{}</section>\n", table.html())

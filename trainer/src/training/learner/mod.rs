@@ -58,6 +58,11 @@ impl Learner {
         }
     }
 
+    /// The same with an optimiser that has taken no step.
+    pub fn fresh(model: ClothCombo, config: &OptimizerConfig) -> Self {
+        Self::new(model, new_optimizer(config), config)
+    }
+
     /// The networks.
     pub fn model(&self) -> &ClothCombo {
         &self.model

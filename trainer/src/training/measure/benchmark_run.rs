@@ -9,7 +9,7 @@ use crate::inference::tensor_store::{DrapeError, TensorStore};
 use crate::run::spread::Spread;
 use crate::system::device::is_processor;
 use crate::system::memory::Memory;
-use crate::training::learner::{Learner, StepInput, new_optimizer};
+use crate::training::learner::{Learner, StepInput};
 use crate::training::process_group::RankPartition;
 use crate::training::scenes::prefetch;
 use crate::training::schedule::Schedule;
@@ -30,6 +30,8 @@ pub struct BenchmarkRun {
     tensors: Arc<TensorStore>,
     learner: Learner,
     device: Device,
+    /// Index of the stage.
+    stage: usize,
     first_step: u64,
 }
 
@@ -80,9 +82,9 @@ impl BenchmarkRun {
         let device = device.clone().autodiff();
         let dimensions = dataset.dimensions();
         let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).into_diagnostic()?;
-        let learner = new_learner(model, &config.optimizer);
+        let learner = Learner::fresh(model, &config.optimizer);
         let tensors = Arc::new(TensorStore::new(dataset, dimensions, &device));
-        Ok(Self { config: Arc::new(config), tensors, learner, device, first_step })
+        Ok(Self { config: Arc::new(config), tensors, learner, device, stage, first_step })
     }
 
     /// The configuration.
@@ -106,7 +108,7 @@ impl BenchmarkRun {
     /// When the networks differ in size.
     pub fn copy_parameters(&mut self, other: &Self) -> Result<(), Report> {
         let model = self.model().clone().try_load_record(other.model().clone().into_record());
-        self.learner = new_learner(model.map_err(|error| miette!("{error}"))?, &self.config.optimizer);
+        self.learner = Learner::fresh(model.map_err(|error| miette!("{error}"))?, &self.config.optimizer);
         Ok(())
     }
 
@@ -124,7 +126,7 @@ impl BenchmarkRun {
 
     /// Which networks the stage trains.
     pub fn trains(&self) -> Trains {
-        self.config.stages[Schedule::new(&self.config).at(self.first_step).stage].trains
+        self.config.stages[self.stage].trains
     }
 
     /// Trains `steps` steps as a run does, scenes prepared ahead on another thread, after three to warm up.
@@ -134,8 +136,7 @@ impl BenchmarkRun {
     pub fn profile(&mut self, steps: usize) -> Result<Profile, Report> {
         const WARM_UP: usize = 3;
         let schedule = Schedule::new(&self.config);
-        let at = schedule.at(self.first_step);
-        let left = schedule.stages()[at.stage].steps;
+        let left = self.config.stages[self.stage].steps;
         if left < (WARM_UP + steps) as u64 {
             return Err(miette!(
                 help = "measure fewer steps with --steps",
@@ -227,7 +228,7 @@ impl BenchmarkRun {
     ) -> Result<(f64, Vec<(String, Vec<f32>)>), DrapeError> {
         // `ClipScope::Step` clips in the update, which is not made here.
         let unclipped = OptimizerConfig { clip: ClipScope::Step, ..self.config.optimizer.clone() };
-        let mut learner = new_learner(self.model().clone(), &unclipped);
+        let mut learner = Learner::fresh(self.model().clone(), &unclipped);
         let input = StepInput::whole(&self.tensors, std::slice::from_ref(scene), self.trains());
         let computed = learner.forward_backward(&input)?;
         let mut named = NamedGradients { gradients: computed.gradients, path: Vec::new(), found: Vec::new() };
@@ -314,10 +315,6 @@ impl BenchmarkRun {
             peak_mib,
         })
     }
-}
-
-fn new_learner(model: ClothCombo, config: &OptimizerConfig) -> Learner {
-    Learner::new(model, new_optimizer(config), config)
 }
 
 struct NamedGradients {

@@ -50,7 +50,7 @@ impl Session {
         };
         let average = (config.optimizer.ema_decay > 0.0)
             .then(|| Average::new(model.valid(), config.optimizer.ema_decay));
-        let learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
+        let learner = Learner::fresh(model, &config.optimizer);
         let start = CheckpointState::of(&dataset, 0).on_device(&name(&device));
         Ok(Self::assemble(run, config, dataset, &device, learner, average, &start))
     }
