@@ -1,6 +1,6 @@
 //! One stage of training: what learns, how long, on how many layers.
 
-use super::ramp::{Ramp, RampShape};
+use super::ramp::Ramp;
 use clothcombo_model::Mode;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -107,7 +107,7 @@ fn paper_rate() -> Ramp {
     Ramp::constant(1e-4)
 }
 fn full_pose() -> Ramp {
-    Ramp { from: 1.0, to: 1.0, start: 0.0, end: 1.0, shape: RampShape::Linear }
+    Ramp::constant(1.0)
 }
 
 impl StageConfig {
@@ -130,6 +130,7 @@ impl StageConfig {
             full
         }
     }
+
     /// What is wrong, as (key, what, hint).
     pub(crate) fn problem(&self) -> Option<(String, String, String)> {
         let says = |k: &str, w: &str, h: &str| Some((k.into(), w.into(), h.into()));

@@ -32,6 +32,7 @@ mod variants;
 pub use evaluator::{NamedModel, Progress, SceneCounts};
 pub use model_under_test::ModelUnderTest;
 pub use page::EvaluationPage;
+pub use score::weighted_terms;
 pub use timing::median_ms;
 pub use validation::ValidationSet;
 

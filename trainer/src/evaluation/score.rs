@@ -8,7 +8,7 @@ use crate::run::validation::MethodScore;
 use clothcombo_physics::contact::{
     CountedBody, LayerOrder, OrderViolations, Penetration, Report, ReportGarment, Selection,
 };
-use clothcombo_physics::energy::{Term, TermMap};
+use clothcombo_physics::energy::{SceneEnergy, Term, TermMap};
 use clothcombo_physics::query::{Distance, Surface};
 
 /// Vertices deeper than this inside the body count as visibly wrong (m).
@@ -35,15 +35,10 @@ pub fn score_scene(scene: &PreparedScene, body: &Surface<f64>, draped: &Draped) 
     // Terms of weight 0 are scored as well: an ablation wants to see what it left out.
     let value = energy.raw(&draped.posed, &draped.canonical);
     let mut score = SceneScore::default();
-    let weights = energy.garments.iter().map(|g| &g.weights).chain(energy.layers.iter().map(|l| &l.weights));
-    for (raw, weights) in value.garments.iter().chain(&value.layers).zip(weights) {
-        for term in Term::ALL {
-            if let Some(v) = raw[term] {
-                score.raw[term] += v;
-                score.weighted[term] += v * weights[term];
-                score.total += v * weights[term];
-            }
-        }
+    for (term, raw, weight) in weighted_terms(energy, &value.garments, &value.layers) {
+        score.raw[term] += raw;
+        score.weighted[term] += raw * weight;
+        score.total += raw * weight;
     }
     let positions = wide(&draped.posed);
     let garments = report_garments(scene, &positions);
@@ -52,6 +47,19 @@ pub fn score_scene(scene: &PreparedScene, body: &Surface<f64>, draped: &Draped) 
     let report = Report::count(&CountedBody::new(body, Distance::ClosestPoint), &garments, &selection);
     (score.penetration, score.order) = (report.penetration(DEEP), report.order());
     score
+}
+
+/// The energies of a scene that were evaluated, of all `garments` and then of all `layers`: term, raw value and weight.
+pub fn weighted_terms<'a>(
+    energy: &'a SceneEnergy<f32>,
+    garments: &'a [TermMap<Option<f64>>],
+    layers: &'a [TermMap<Option<f64>>],
+) -> impl Iterator<Item = (Term, f64, f64)> + 'a {
+    let weights = energy.garments.iter().map(|g| &g.weights).chain(energy.layers.iter().map(|l| &l.weights));
+    let values = garments.iter().chain(layers).zip(weights);
+    values.flat_map(|(values, weights)| {
+        Term::ALL.into_iter().filter_map(|term| Some((term, values[term]?, weights[term])))
+    })
 }
 
 /// The garments of `scene` at packed `positions`, to be counted.

@@ -2,6 +2,7 @@
 
 use super::learner::{StepOutput, larger};
 use crate::dataset::PreparedScene;
+use crate::evaluation::weighted_terms;
 use crate::run::event::StepRecord;
 use clothcombo_physics::energy::Term;
 
@@ -18,18 +19,8 @@ impl StepRecord {
         for (scene, outputs) in scenes.iter().zip(&output.scenes) {
             let share = 1.0 / (scene.bodies.len() * total) as f64;
             for (body, value) in scene.bodies.iter().zip(outputs.iter().map(|s| s.value())) {
-                let energy = &body.energy;
-                let weights = energy
-                    .garments
-                    .iter()
-                    .map(|g| &g.weights)
-                    .chain(energy.layers.iter().map(|l| &l.weights));
-                for (values, weights) in value.garments.iter().chain(&value.layers).zip(weights) {
-                    for term in Term::ALL {
-                        if let Some(v) = values[term] {
-                            record.add(term, v * share, v * weights[term] * share);
-                        }
-                    }
+                for (term, raw, weight) in weighted_terms(&body.energy, &value.garments, &value.layers) {
+                    record.add(term, raw * share, raw * weight * share);
                 }
             }
         }

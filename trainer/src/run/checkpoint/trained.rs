@@ -94,27 +94,19 @@ impl TrainedModel {
     /// # Errors
     /// When its file is damaged.
     pub fn body(&self) -> Result<Option<Body>, DatasetError> {
-        let count = self.state.shape_count;
-        let beside = self.folder.join(BODY);
-        let own = &self.config.data.body;
-        let name = match own.as_str() {
-            "mannequin" => own.clone(),
-            _ if self.built_in.is_some() => {
-                let bytes = self.built_in.map_or(&[][..], |files| files.body);
-                let file = NpzFile::of_bytes(Path::new(BODY), bytes).map_err(DatasetError::data)?;
-                return read_body(file, count).map(Some);
-            }
-            _ if beside.is_file() => beside.display().to_string(),
-            _ => {
-                // A run lies somewhere below the folder its paths are relative to.
-                let places = std::iter::once(Path::new("")).chain(self.folder.ancestors());
-                match places.map(|place| place.join(own)).find(|path| path.is_file()) {
-                    Some(found) => found.display().to_string(),
-                    None => return Ok(None),
-                }
-            }
-        };
-        load_body(&name, count).map(Some)
+        let (own, count) = (&self.config.data.body, self.state.shape_count);
+        if own == "mannequin" {
+            return load_body(own, count).map(Some);
+        }
+        if let Some(files) = self.built_in {
+            let file = NpzFile::of_bytes(Path::new(BODY), files.body).map_err(DatasetError::data)?;
+            return read_body(file, count).map(Some);
+        }
+        // A run lies somewhere below the folder its paths are relative to.
+        let places = std::iter::once(Path::new("")).chain(self.folder.ancestors());
+        let mut paths = std::iter::once(self.folder.join(BODY)).chain(places.map(|place| place.join(own)));
+        let found = paths.find(|path| path.is_file());
+        found.map(|path| load_body(&path.display().to_string(), count)).transpose()
     }
 
     /// The networks, on `device`.

@@ -36,9 +36,16 @@ impl<W: Write> EventFile<W> {
     ///
     /// # Errors
     /// The writer's.
-    pub fn scalars<'a>(&mut self, step: u64, values: impl Iterator<Item = (&'a str, f64)>) -> io::Result<()> {
+    pub fn scalars<T: AsRef<str>>(
+        &mut self,
+        step: u64,
+        values: impl Iterator<Item = (T, f64)>,
+    ) -> io::Result<()> {
         let summary = values.fold(ProtocolMessage::default(), |summary, (tag, value)| {
-            summary.bytes(1, &ProtocolMessage::default().bytes(1, tag.as_bytes()).float(2, value as f32).0)
+            summary.bytes(
+                1,
+                &ProtocolMessage::default().bytes(1, tag.as_ref().as_bytes()).float(2, value as f32).0,
+            )
         });
         self.summary(step, summary)
     }
@@ -166,7 +173,6 @@ impl TensorBoardObserver {
                 if r.step % self.every != 0 {
                     return Ok(());
                 }
-                let raw: Vec<(String, f64)> = r.raw.iter().map(|(n, v)| (format!("raw/{n}"), *v)).collect();
                 let plain = [
                     ("loss/weighted", r.loss),
                     ("gradient/norm", r.grad_norm),
@@ -179,8 +185,9 @@ impl TensorBoardObserver {
                     ("time/backward", r.backward_seconds),
                     ("time/update", r.update_seconds),
                 ];
-                let raw = raw.iter().map(|(n, v)| (n.as_str(), *v));
-                self.events.scalars(r.step, plain.into_iter().chain(raw))
+                let plain = plain.into_iter().map(|(name, value)| (name.to_owned(), value));
+                let raw = r.raw.iter().map(|(name, value)| (format!("raw/{name}"), *value));
+                self.events.scalars(r.step, plain.chain(raw))
             }
             TrainEvent::Validated { step, report, .. } => {
                 let mut values = Vec::new();
@@ -192,7 +199,7 @@ impl TensorBoardObserver {
                     values.push((tag("layer-order violations"), network.order_violations_nearest_vertex));
                     values.extend(network.raw.iter().map(|(name, spread)| (tag(name), spread.mean)));
                 }
-                self.events.scalars(*step, values.iter().map(|(n, v)| (n.as_str(), *v)))?;
+                self.events.scalars(*step, values.into_iter())?;
                 self.events.flush()
             }
             TrainEvent::SampleDrawn { path } => self.picture(path),
