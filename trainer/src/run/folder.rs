@@ -7,7 +7,7 @@ pub use error::RunDirError;
 use crate::config::{Config, load, to_toml};
 use crate::dataset::SplitNames;
 use crate::run::difference::{AllowedChanges, differences, differing_keys};
-use crate::run::lock::{FILE, LockError, RunLock};
+use crate::run::lock::{FILE, RunLock};
 use crate::system::files::check_writable;
 use crate::system::paths::obstacle;
 use clothcombo_data::format::atomic::{self, Temporary};
@@ -142,10 +142,7 @@ impl RunDir {
     }
 
     fn locked(root: &Path) -> Result<Self, RunDirError> {
-        let lock = RunLock::acquire(root).map_err(|error| match error {
-            LockError::Held { owner } => RunDirError::InUse { path: root.to_owned(), owner },
-            LockError::Io { path, reason } => RunDirError::Io { path, reason },
-        })?;
+        let lock = RunLock::acquire(root)?;
         let run = Self { _lock: Some(Arc::new(lock)), ..Self::follow(root) };
         [run.root.clone(), run.checkpoints(), run.samples(), run.incidents()].iter().for_each(|f| sweep(f));
         Ok(run)

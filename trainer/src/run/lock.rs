@@ -2,9 +2,10 @@
 //!
 //! The system drops the lock when the process ends, however it ends: nothing has to be cleaned up after a `kill -9`.
 
+use super::folder::RunDirError;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::Path;
 use std::time::Duration;
 
 /// Its name in the run's folder.
@@ -19,31 +20,14 @@ pub struct RunLock {
     _file: File,
 }
 
-/// Why a folder cannot be locked.
-#[derive(Debug)]
-pub enum LockError {
-    /// Somebody else holds it.
-    Held {
-        /// What the holder wrote about itself.
-        owner: String,
-    },
-    /// The lock file cannot be made.
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        reason: io::Error,
-    },
-}
-
 impl RunLock {
     /// Locks `root`, which must exist.
     ///
     /// # Errors
     /// When another process holds it, or the file cannot be written.
-    pub fn acquire(root: &Path) -> Result<Self, LockError> {
+    pub fn acquire(root: &Path) -> Result<Self, RunDirError> {
         let path = root.join(FILE);
-        let failed = |reason| LockError::Io { path: path.clone(), reason };
+        let failed = |reason| RunDirError::Io { path: path.clone(), reason };
         let mut file = OpenOptions::new()
             .read(true)
             .write(true)
@@ -59,7 +43,7 @@ impl RunLock {
                     let _ = file.read_to_string(&mut owner);
                     let owner =
                         if owner.trim().is_empty() { "another process".into() } else { owner.trim().into() };
-                    return Err(LockError::Held { owner });
+                    return Err(RunDirError::InUse { path: root.to_owned(), owner });
                 }
                 Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(50)),
                 Err(TryLockError::Error(e)) => {
@@ -98,7 +82,7 @@ mod tests {
         assert!(!RunLock::is_held(folder.path()));
         let lock = RunLock::acquire(folder.path()).unwrap();
         assert!(RunLock::is_held(folder.path()));
-        assert!(matches!(RunLock::acquire(folder.path()), Err(LockError::Held { .. })));
+        assert!(matches!(RunLock::acquire(folder.path()), Err(RunDirError::InUse { .. })));
         drop(lock);
         assert!(!RunLock::is_held(folder.path()));
         RunLock::acquire(folder.path()).unwrap();
