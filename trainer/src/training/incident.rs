@@ -6,7 +6,7 @@
 //! ```
 //! The scene is kept by its numbers, not by its seed alone: it replays even where the generator has changed since.
 
-use crate::config::{Config, ConfigError, Injected, Trains, parse, to_toml};
+use crate::config::{Config, Injected, Trains, parse, to_toml};
 use crate::dataset::{BodySample, Dataset, PreparedScene, SceneSample, prepare};
 use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::{checksum, load_model, save_model};
@@ -18,46 +18,15 @@ use clothcombo_data::asset::Pose;
 use clothcombo_data::format::atomic;
 use clothcombo_model::ClothCombo;
 use clothcombo_physics::energy::{Term, TermMap};
-use miette::Diagnostic;
+use miette::{Report, miette};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use thiserror::Error;
 
 /// Version of the file; others are refused.
 const FORMAT: u32 = 2;
-
-/// Why an incident cannot be written, read or replayed.
-#[derive(Debug, Error, Diagnostic)]
-pub enum IncidentError {
-    /// The file system refused, or the content is wrong.
-    #[error("{}: {reason}", path.display())]
-    #[diagnostic(help("an incident is RUN/incidents/step-N.json with step-N.bpk beside it; copy both"))]
-    Unusable {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// The data is not what it was.
-    #[error("garment {name:?} of the incident {reason}")]
-    #[diagnostic(help("restore the data of the run, or point to it with --set data.garments.0.folder=…"))]
-    DataChanged {
-        /// The garment.
-        name: String,
-        /// What is different.
-        reason: String,
-    },
-    /// The configuration inside cannot be used.
-    #[error(transparent)]
-    #[diagnostic(transparent)]
-    Config(#[from] ConfigError),
-    /// The scene cannot be prepared or draped.
-    #[error(transparent)]
-    #[diagnostic(transparent)]
-    Drape(#[from] crate::inference::tensor_store::DrapeError),
-}
 
 /// A step whose loss or gradient was not finite.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -164,13 +133,13 @@ impl Incident {
         around: &Circumstances,
         scenes: &[PreparedScene],
         output: &StepOutput,
-    ) -> Result<PathBuf, IncidentError> {
+    ) -> Result<PathBuf, Report> {
         let path = folder.join(format!("step-{}.json", around.step));
-        let unusable = |reason: String| IncidentError::Unusable { path: path.clone(), reason };
-        std::fs::create_dir_all(folder).map_err(|e| unusable(e.to_string()))?;
+        let unusable = |e: &dyn Display| unusable(&path, e);
+        std::fs::create_dir_all(folder).map_err(|e| unusable(&e))?;
         let weights = format!("step-{}.bpk", around.step);
-        save_model(around.model, &folder.join(&weights)).map_err(unusable)?;
-        let weights_checksum = checksum(&folder.join(&weights)).map_err(|e| unusable(e.to_string()))?;
+        save_model(around.model, &folder.join(&weights)).map_err(|e| unusable(&e))?;
+        let weights_checksum = checksum(&folder.join(&weights)).map_err(|e| unusable(&e))?;
         let stage = &around.config.stages[around.at.stage];
         let incident = Self {
             format: FORMAT,
@@ -187,10 +156,10 @@ impl Incident {
             scenes: describe(around.dataset, scenes, output),
             weights,
             weights_checksum,
-            config: to_toml(around.config).map_err(|e| unusable(e.to_string()))?,
+            config: to_toml(around.config).map_err(|e| unusable(&e))?,
         };
-        let text = serde_json::to_vec_pretty(&incident).map_err(|e| unusable(e.to_string()))?;
-        atomic::write(&path, &text).map_err(|e| unusable(e.to_string()))?;
+        let text = serde_json::to_vec_pretty(&incident).map_err(|e| unusable(&e))?;
+        atomic::write(&path, &text).map_err(|e| unusable(&e))?;
         Ok(path)
     }
 
@@ -198,19 +167,18 @@ impl Incident {
     ///
     /// # Errors
     /// When it is damaged or of another version.
-    pub fn read(path: &Path) -> Result<Self, IncidentError> {
-        let unusable = |reason: String| IncidentError::Unusable { path: path.to_owned(), reason };
-        let text = std::fs::read_to_string(path).map_err(|e| unusable(e.to_string()))?;
+    pub fn read(path: &Path) -> Result<Self, Report> {
+        let text = std::fs::read_to_string(path).map_err(|e| unusable(path, &e))?;
         let tree: serde_json::Value =
-            serde_json::from_str(&text).map_err(|e| unusable(format!("is no incident: {e}")))?;
+            serde_json::from_str(&text).map_err(|e| unusable(path, &format!("is no incident: {e}")))?;
         match tree["format"].as_u64() {
             Some(version) if version == u64::from(FORMAT) => {}
-            _ => return Err(unusable(format!("is no incident of version {FORMAT}"))),
+            _ => return Err(unusable(path, &format!("is no incident of version {FORMAT}"))),
         }
-        let incident: Self = serde_json::from_value(tree).map_err(|e| unusable(e.to_string()))?;
+        let incident: Self = serde_json::from_value(tree).map_err(|e| unusable(path, &e))?;
         match incident.scenes.iter().all(|s| !s.garments.is_empty() && !s.bodies.is_empty()) {
             true if !incident.scenes.is_empty() => Ok(incident),
-            _ => Err(unusable("has no scene".into())),
+            _ => Err(unusable(path, &"has no scene")),
         }
     }
 
@@ -218,7 +186,7 @@ impl Incident {
     ///
     /// # Errors
     /// When it cannot be used.
-    pub fn configuration(&self, path: &Path, overrides: &[String]) -> Result<Config, IncidentError> {
+    pub fn configuration(&self, path: &Path, overrides: &[String]) -> Result<Config, Report> {
         Ok(parse(&self.config, path, overrides)?)
     }
 
@@ -232,14 +200,13 @@ impl Incident {
         config: &Config,
         dataset: &Arc<Dataset>,
         device: &Device,
-    ) -> Result<Self, IncidentError> {
+    ) -> Result<Self, Report> {
         let device = device.clone().autodiff();
         let model = self.model(path, config, dataset, &device)?;
         let mut scenes = Vec::with_capacity(self.scenes.len());
         for scene in &self.scenes {
             let sample = scene.to_sample(dataset, path)?;
-            let prepared = prepare(dataset, &config.losses, sample, self.run_progress.0);
-            scenes.push(prepared.map_err(crate::inference::tensor_store::DrapeError::from)?);
+            scenes.push(prepare(dataset, &config.losses, sample, self.run_progress.0)?);
         }
         if self.injected == Some(Injected::Position) {
             spoil_position(&mut scenes);
@@ -263,14 +230,15 @@ impl Incident {
         config: &Config,
         dataset: &Dataset,
         device: &Device,
-    ) -> Result<ClothCombo, IncidentError> {
+    ) -> Result<ClothCombo, Report> {
         let file = path.with_file_name(&self.weights);
-        let unusable = |reason: String| IncidentError::Unusable { path: file.clone(), reason };
-        let sum = checksum(&file).map_err(|e| unusable(e.to_string()))?;
+        let sum = checksum(&file).map_err(|e| unusable(&file, &e))?;
         if sum != self.weights_checksum {
-            return Err(unusable("does not match its checksum".into()));
+            return Err(unusable(&file, &"does not match its checksum"));
         }
-        load_model(&file, &config.model, &dataset.dimensions(), device).flatten().map_err(unusable)
+        load_model(&file, &config.model, &dataset.dimensions(), device)
+            .flatten()
+            .map_err(|e| unusable(&file, &e))
     }
 
     /// All numbers that a replay must reproduce, by name, in order.
@@ -290,6 +258,15 @@ impl Incident {
         }
         out
     }
+}
+
+/// What is wrong with the incident or the weights in `path`.
+fn unusable(path: &Path, reason: &dyn Display) -> Report {
+    miette!(
+        help = "an incident is RUN/incidents/step-N.json with step-N.bpk beside it; copy both",
+        "{}: {reason}",
+        path.display()
+    )
 }
 
 /// Gives the first vertex of the first body a NaN coordinate.
@@ -332,9 +309,15 @@ fn describe(dataset: &Dataset, scenes: &[PreparedScene], output: &StepOutput) ->
 
 impl IncidentScene {
     /// The scene as it was sampled.
-    fn to_sample(&self, dataset: &Dataset, path: &Path) -> Result<SceneSample, IncidentError> {
+    fn to_sample(&self, dataset: &Dataset, path: &Path) -> Result<SceneSample, Report> {
         let index = |garment: &IncidentGarment| {
-            let changed = |reason: String| IncidentError::DataChanged { name: garment.name.clone(), reason };
+            let changed = |reason: String| {
+                miette!(
+                    help = "restore the data of the run, or point to it with --set data.garments.0.folder=…",
+                    "garment {:?} of the incident {reason}",
+                    garment.name
+                )
+            };
             let is_it = |i: usize| dataset.garments.info(i).name == garment.name;
             let index = Some(garment.index)
                 .filter(|&i| i < dataset.garments.len() && is_it(i))
@@ -345,16 +328,15 @@ impl IncidentScene {
                 found => Err(changed(format!("has {found} vertices now, it had {}", garment.vertices))),
             }
         };
-        let wrong = |reason: &str| IncidentError::Unusable { path: path.to_owned(), reason: reason.into() };
         let bodies = self.bodies.iter().map(|body| {
             let pose = Pose { rotations: body.pose.iter().map(|r| r.map(|v| v.0)).collect() };
             if body.shape.len() != dataset.shape_count || pose.rotations.len() > dataset.body.joint_count() {
-                return Err(wrong("has a shape or pose that the body of the run does not take"));
+                return Err(unusable(path, &"has a shape or pose that the body of the run does not take"));
             }
             let shape: Vec<f64> = body.shape.iter().map(|v| v.0).collect();
             match shape.iter().chain(pose.rotations.as_flattened()).all(|v| v.is_finite()) {
                 true => Ok(BodySample { shape, pose }),
-                false => Err(wrong("has a shape or pose that is not finite")),
+                false => Err(unusable(path, &"has a shape or pose that is not finite")),
             }
         });
         Ok(SceneSample {

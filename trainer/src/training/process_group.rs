@@ -7,7 +7,7 @@
 //! barrier before each exchange ([`ProcessGroup::barrier`]) and one at the end ([`ProcessGroup::conclude`]): a process with an
 //! error goes straight to the latter, and the others learn of it at whichever barrier they wait.
 
-use miette::{Diagnostic, Report};
+use miette::{Diagnostic, Report, miette};
 use thiserror::Error;
 
 #[cfg(feature = "mpi")]
@@ -49,37 +49,6 @@ pub struct FailedElsewhere {
     pub rank: usize,
 }
 
-/// Why processes cannot train together.
-#[derive(Debug, Error, Diagnostic)]
-pub enum ProcessGroupError {
-    /// Started by an MPI launcher, but built without MPI.
-    #[error("started as one of {size} MPI processes, but this program was built without MPI")]
-    #[diagnostic(help("build with --features mpi, or start it without mpirun"))]
-    NotBuilt {
-        /// Processes the launcher started.
-        size: usize,
-    },
-    /// MPI cannot be started.
-    #[error("MPI cannot be started in this process")]
-    #[diagnostic(help("start it through mpirun, and see whether `mpirun -n 2 hostname` works"))]
-    NotStarted,
-    /// Some process would have no scene.
-    #[error(
-        "stage {stage:?} takes {accumulate} outfits per update, which {size} processes cannot share equally"
-    )]
-    #[diagnostic(help(
-        "set accumulate of every stage to a multiple of the processes: --set stages.0.accumulate={size}"
-    ))]
-    UnequalShares {
-        /// The stage.
-        stage: String,
-        /// Its outfits per update.
-        accumulate: usize,
-        /// Processes.
-        size: usize,
-    },
-}
-
 /// What one process brings to a barrier.
 #[derive(Clone, Copy)]
 enum Status {
@@ -94,13 +63,22 @@ impl ProcessGroup {
     ///
     /// # Errors
     /// When MPI does not start, or this build knows none and several processes were started.
-    pub fn join() -> Result<Self, ProcessGroupError> {
+    pub fn join() -> Result<Self, Report> {
         #[cfg(feature = "mpi")]
-        return Ok(Self { engine: Some(Engine::start().ok_or(ProcessGroupError::NotStarted)?) });
+        return match Engine::start() {
+            Some(engine) => Ok(Self { engine: Some(engine) }),
+            None => Err(miette!(
+                help = "start it through mpirun, and see whether `mpirun -n 2 hostname` works",
+                "MPI cannot be started in this process"
+            )),
+        };
         #[cfg(not(feature = "mpi"))]
         match launched() {
             0 | 1 => Ok(Self::default()),
-            size => Err(ProcessGroupError::NotBuilt { size }),
+            size => Err(miette!(
+                help = "build with --features mpi, or start it without mpirun",
+                "started as one of {size} MPI processes, but this program was built without MPI"
+            )),
         }
     }
 

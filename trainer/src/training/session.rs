@@ -16,11 +16,11 @@ use crate::system::memory::Memory;
 use crate::training::average::Average;
 use crate::training::guard::Guard;
 use crate::training::learner::Learner;
-use crate::training::process_group::{ProcessGroup, ProcessGroupError};
+use crate::training::process_group::ProcessGroup;
 use crate::training::schedule::Schedule;
 use burn::module::Module;
 use burn::tensor::Device;
-use miette::Report;
+use miette::{Report, miette};
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -59,14 +59,17 @@ impl Session {
     ///
     /// # Errors
     /// When they cannot share the scenes of every stage equally.
-    pub fn shared_in(mut self, group: Rc<ProcessGroup>) -> Result<Self, ProcessGroupError> {
+    pub fn shared_in(mut self, group: Rc<ProcessGroup>) -> Result<Self, Report> {
         let size = group.partition().size;
         match self.schedule.stages().iter().find(|stage| stage.accumulate % size != 0) {
-            Some(stage) => Err(ProcessGroupError::UnequalShares {
-                stage: stage.name.clone(),
-                accumulate: stage.accumulate,
-                size,
-            }),
+            Some(stage) => Err(miette!(
+                help = format!(
+                    "set accumulate of every stage to a multiple of the processes: --set stages.0.accumulate={size}"
+                ),
+                "stage {:?} takes {} outfits per update, which {size} processes cannot share equally",
+                stage.name,
+                stage.accumulate
+            )),
             None => {
                 self.group = group;
                 Ok(self)
