@@ -1,6 +1,6 @@
 //! What the values of flags must be, where the type alone does not say it.
 
-use crate::config::MOST_GARMENTS;
+use crate::config::MOST_GENERATED_GARMENTS;
 use crate::system::paths::obstacle;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -19,7 +19,9 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
 /// Number of garments or of vertices: at most as many as the garments that a configuration may ask for.
 pub fn count(text: &str) -> Result<usize, String> {
     match at_least_one(text)? {
-        count if count > MOST_GARMENTS => Err(format!("it must be at most {MOST_GARMENTS}")),
+        count if count > MOST_GENERATED_GARMENTS => {
+            Err(format!("it must be at most {MOST_GENERATED_GARMENTS}"))
+        }
         count => Ok(count),
     }
 }

@@ -330,7 +330,7 @@ impl Default for StartConfig {
 }
 
 /// Garments a generator is asked for at most.
-pub const MOST_GARMENTS: usize = 1_000_000;
+pub const MOST_GENERATED_GARMENTS: usize = 1_000_000;
 
 /// Poses a bank has at most: 5 GB.
 const MOST_BANK_POSES: usize = 10_000_000;
@@ -379,7 +379,7 @@ impl DataConfig {
         for (i, source) in self.garments.iter().enumerate() {
             if let Some(g) = &source.generate
                 && (g.count == 0
-                    || g.count > MOST_GARMENTS
+                    || g.count > MOST_GENERATED_GARMENTS
                     || g.categories.is_empty()
                     || !(200..=50_000).contains(&g.vertices))
             {

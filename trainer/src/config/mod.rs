@@ -20,8 +20,8 @@ mod stages;
 mod validation;
 
 pub use data::{
-    CacheConfig, DataConfig, GarmentSourceConfig, GenerateConfig, MOST_GARMENTS, PoseBankConfig, PoseConfig,
-    PoseEncoding, SplitConfig, StartConfig,
+    CacheConfig, DataConfig, GarmentSourceConfig, GenerateConfig, MOST_GENERATED_GARMENTS, PoseBankConfig,
+    PoseConfig, PoseEncoding, SplitConfig, StartConfig,
 };
 pub use error::ConfigError;
 pub use guard::{GuardConfig, InjectConfig, Injected};

@@ -89,10 +89,10 @@ pub struct StageConfig {
 }
 
 /// Steps of a stage at most: sums of them must stay countable.
-const MOST_STEPS: u64 = 1_000_000_000_000;
+const MOST_STAGE_STEPS: u64 = 1_000_000_000_000;
 
 /// Outfits of a step, and bodies of an outfit, at most.
-const MOST_SCENES: usize = 1024;
+const MOST_STEP_SCENES: usize = 1024;
 
 /// Layers of a scene at most; the number of pairs grows with its square.
 pub(super) const MOST_LAYERS: usize = 32;
@@ -137,7 +137,7 @@ impl StageConfig {
         let [low, high] = self.layers;
         if self.steps == 0 {
             says("steps", "a stage of no steps trains nothing", "remove the stage or give it steps")
-        } else if self.steps > MOST_STEPS {
+        } else if self.steps > MOST_STAGE_STEPS {
             says("steps", "is more than a trillion", "the paper trains some hundred thousand")
         } else if low == 0 || low > high {
             says("layers", "is not a range [fewest, most] of at least one layer", "for example [1, 6]")
@@ -153,9 +153,9 @@ impl StageConfig {
             says("layers", "are more garments than anyone wears", "the paper goes up to 6, 32 are allowed")
         } else if !(0.0..=1.0).contains(&self.layer_curriculum) {
             says("layer_curriculum", "is not a fraction of the stage", "for example 0.5; 0 switches it off")
-        } else if self.bodies == 0 || self.bodies > MOST_SCENES {
+        } else if self.bodies == 0 || self.bodies > MOST_STEP_SCENES {
             says("bodies", "must lie between 1 and 1024", "1 drapes every outfit on one body")
-        } else if self.accumulate == 0 || self.accumulate > MOST_SCENES {
+        } else if self.accumulate == 0 || self.accumulate > MOST_STEP_SCENES {
             says("accumulate", "must lie between 1 and 1024", "1 makes an update after every scene")
         } else if self.warm_up_steps > self.steps {
             says("warm_up_steps", "is longer than the stage", "use some hundred steps, or 0 for none")

@@ -42,7 +42,7 @@ impl Default for ValidationConfig {
 }
 
 /// Scenes of a group at most: all of them are drawn before the first is scored.
-const MOST_SCENES: usize = 100_000;
+const MOST_GROUP_SCENES: usize = 100_000;
 
 impl ValidationConfig {
     /// What is inconsistent, as (place, what, hint).
@@ -54,7 +54,7 @@ impl ValidationConfig {
         if self.layered_scenes > 0 && !(2 <= low && low <= high && high <= MOST_LAYERS) {
             return says("validation.layers", "is not a range of at least two layers", "for example [2, 4]");
         }
-        if counts.iter().any(|count| *count > MOST_SCENES) {
+        if counts.iter().any(|count| *count > MOST_GROUP_SCENES) {
             return says("validation", "has more than 100,000 scenes of a kind", "some dozens are enough");
         }
         None

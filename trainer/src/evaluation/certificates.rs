@@ -1,6 +1,6 @@
 //! The certificates of random outfits in clips that were not trained on, before and after the post-process.
 
-use super::layers::AFTER;
+use super::layers::AFTER_POST_PROCESS;
 use super::post_processor::DrapedScene;
 use super::{Estimate, Evaluator, Proportion, Section, Table};
 use crate::dataset::{HeldOut, PreparedScene};
@@ -14,9 +14,9 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// Random stream of the outfits.
-const STREAM: usize = 15;
+const OUTFIT_STREAM: usize = 15;
 /// Outfits have 1 to so many garments, one more from each to the next.
-const MOST_GARMENTS: usize = 6;
+const MOST_OUTFIT_LAYERS: usize = 6;
 /// A body with fewer pairs in pinched regions before the post-process is called hardly pinched.
 const HARDLY_PINCHED: usize = 200;
 
@@ -64,7 +64,8 @@ fn resolved(evaluator: &Evaluator<'_>, index: usize) -> Result<PostProcessedOutf
     let Evaluator { model, networks, post_process, meshes, .. } = evaluator;
     let clips = HeldOut::ValidationClips;
     let poses = if model.dataset.poses.has(clips) { clips } else { HeldOut::Windows };
-    let sample = model.sample([STREAM, index], &model.garments(), 1 + index % MOST_GARMENTS, poses);
+    let sample =
+        model.sample([OUTFIT_STREAM, index], &model.garments(), 1 + index % MOST_OUTFIT_LAYERS, poses);
     let scene = model.prepare(&sample)?;
     let draped = post_process.of(&scene, &networks.drape(&scene)?.posed);
     let outfit = PostProcessedOutfit {
@@ -106,12 +107,12 @@ fn statistics(outfits: &[PostProcessedOutfit]) -> Vec<Value> {
                 Proportion::new(after.iter().map(|resolved| resolved.certificate.is_clear())),
             ],
             "self_intersecting": Proportion::new(after.iter().map(|r| r.certificate.self_triangle_pairs > 0)),
-            "after": Estimate::of_metrics(&after, &AFTER),
+            "after": Estimate::of_metrics(&after, &AFTER_POST_PROCESS),
             // Rise of the strain energy by the post-process, as a share.
             "strain_added": Estimate::of(after.iter().filter_map(|r| r.certificate.strain_added)),
         })
     };
-    let by_count = (1..=MOST_GARMENTS).map(|count| {
+    let by_count = (1..=MOST_OUTFIT_LAYERS).map(|count| {
         let name = format!("{count} garment{}", if count == 1 { "" } else { "s" });
         row(name, &|outfit| outfit.garments.len() == count)
     });

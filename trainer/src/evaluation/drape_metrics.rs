@@ -103,7 +103,7 @@ fn paper_collisions(scene: &SceneEnergy<f32>) -> SceneEnergy<f32> {
 }
 
 /// What is estimated besides the energies.
-const METRICS: [Metric<DrapeMetrics>; 9] = [
+const DRAPE_METRICS: [Metric<DrapeMetrics>; 9] = [
     ("total", |m| m.score.total),
     ("paper_collision", |m| m.paper_collision),
     ("paper_layer_collision", |m| m.paper_layer_collision),
@@ -122,13 +122,13 @@ impl DrapeMetrics {
 }
 
 /// Estimates of one drape per scene: the energies as they are (strain, bending and gravity in J) and times their weights (J), and
-/// the [`METRICS`].
+/// the [`DRAPE_METRICS`].
 pub fn estimates(method: &str, scenes: &[&DrapeMetrics]) -> Value {
     let energies = |terms: fn(&SceneScore) -> &TermMap<f64>| -> BTreeMap<&str, Estimate> {
         let of = |term: Term| Estimate::of(scenes.iter().map(|m| terms(&m.score)[term]));
         Term::ALL.into_iter().map(|term| (term.name(), of(term))).collect()
     };
-    let mut estimates = json!(Estimate::of_metrics(scenes, &METRICS));
+    let mut estimates = json!(Estimate::of_metrics(scenes, &DRAPE_METRICS));
     estimates["method"] = json!(method);
     estimates["raw"] = json!(energies(|score| &score.raw));
     estimates["weighted"] = json!(energies(|score| &score.weighted));

@@ -13,7 +13,7 @@ use serde_json::json;
 use std::time::{Duration, Instant};
 
 /// The phases. Times are per garment, but for the preparation of the body, which is once per outfit.
-const PHASES: [Column<'_>; 6] = [
+const PHASE_COLUMNS: [Column<'_>; 6] = [
     ("embedding, once", "/milliseconds/embedding", median_and_p95),
     ("single draping", "/milliseconds/single", median_and_p95),
     ("untangling", "/milliseconds/untangling", median_and_p95),
@@ -22,21 +22,21 @@ const PHASES: [Column<'_>; 6] = [
     ("body of the post-process, once", "/milliseconds/body", median_and_p95),
 ];
 /// The paper's Table 5.
-const PAPER: [&str; 7] = ["paper", "27", "0.6", "0.4", "–", "200–300", "–"];
+const PAPER_TABLE_5: [&str; 7] = ["paper", "27", "0.6", "0.4", "–", "200–300", "–"];
 
 /// Garments of an outfit that is timed.
-const LAYERS: usize = 3;
+const TIMED_LAYERS: usize = 3;
 
 /// Wall time of every phase of random outfits, all threads, one outfit at a time.
 pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     let Evaluator { model, post_process, settings, counts, .. } = evaluator;
     let outfits = counts.timed;
     let tensors = &model.tensors;
-    let mut times: [Vec<f64>; PHASES.len()] = Default::default();
+    let mut times: [Vec<f64>; PHASE_COLUMNS.len()] = Default::default();
     let (mut vertices, mut garments) = (0, 0);
     // The first outfit warms up: buffers, threads, files.
     for index in 0..=outfits {
-        let scene = model.prepare(&model.sample_outfit([6, index], LAYERS))?;
+        let scene = model.prepare(&model.sample_outfit([6, index], TIMED_LAYERS))?;
         let outfit = tensors.outfit(&scene)?;
         let count = scene.garments.len();
         let milliseconds = |time: Duration| 1e3 * time.as_secs_f64();
@@ -74,7 +74,7 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     let numbers = json!({
         "name": "this model",
         "outfits": outfits,
-        "layers": LAYERS,
+        "layers": TIMED_LAYERS,
         "vertices": vertices,
         "threads": threads,
         "milliseconds": {
@@ -87,11 +87,12 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
         },
     });
     let title = format!(
-        "Time per garment [ms]: {outfits} outfits of {LAYERS} garments, {vertices:.0} vertices each in the mean"
+        "Time per garment [ms]: {outfits} outfits of {TIMED_LAYERS} garments, {vertices:.0} vertices each in the mean"
     );
-    let columns = [[("", "/name", plain as fn(&_) -> _)].as_slice(), &PHASES].concat();
-    let table =
-        Table::new(title, std::slice::from_ref(&numbers), &columns).with_row(PAPER).with_note(format!(
+    let columns = [[("", "/name", plain as fn(&_) -> _)].as_slice(), &PHASE_COLUMNS].concat();
+    let table = Table::new(title, std::slice::from_ref(&numbers), &columns)
+        .with_row(PAPER_TABLE_5)
+        .with_note(format!(
             "Median (95th percentile), {threads} threads. The paper's times are for 8,000 vertices on a GPU."
         ));
     Ok(vec![Section::new("times", "Time per phase (Table 5)", "", numbers, vec![table])])

@@ -14,7 +14,7 @@ use clothcombo_physics::energy::Term;
 use miette::Report;
 use serde_json::{Value, json};
 
-const KINDS: [&str; 3] = ["correct", "different", "zero"];
+const EMBEDDING_KINDS: [&str; 3] = ["correct", "different", "zero"];
 
 fn scenes(evaluator: &Evaluator<'_>) -> Vec<Scenes> {
     let sets = [(3, GarmentSet::Training), (4, GarmentSet::Test)];
@@ -71,7 +71,7 @@ fn evaluate(evaluator: &Evaluator<'_>, scenes: &Scenes) -> Result<Value, DrapeEr
     let measured = evaluator.measure(model, &scenes.samples(evaluator), drape)?;
     let of_kind = |kind: usize| measured.iter().map(|drapes| &drapes[kind]).collect::<Vec<_>>();
     let kinds: Vec<Value> =
-        KINDS.iter().enumerate().map(|(kind, name)| estimates(name, &of_kind(kind))).collect();
+        EMBEDDING_KINDS.iter().enumerate().map(|(kind, name)| estimates(name, &of_kind(kind))).collect();
     Ok(json!({
         "title": scenes.set.title(&model.dataset),
         "set": scenes.set,
@@ -91,7 +91,7 @@ fn resampled(embedding: GarmentEmbedding, count: usize) -> GarmentEmbedding {
 }
 
 /// The paper's Table 1.
-const PAPER: [[&str; 6]; 3] = [
+const PAPER_TABLE_1: [[&str; 6]; 3] = [
     ["paper: correct", "0.899", "0.081", "–", "0.57", "-0.623"],
     ["paper: different", "2.77e14", "5.5e5", "–", "109", "-0.553"],
     ["paper: zero", "179", "0.116", "–", "187", "-0.57"],
@@ -112,7 +112,7 @@ fn table(set: &Value) -> Table {
         plain(&set["title"]),
         set["scenes"]
     );
-    let table = PAPER.into_iter().fold(Table::new(title, rows, &columns), Table::with_row);
+    let table = PAPER_TABLE_1.into_iter().fold(Table::new(title, rows, &columns), Table::with_row);
     table
         .transposed()
         .with_note("Means over the scenes (medians); single garments, by the forward pass alone.")

@@ -14,19 +14,19 @@ use miette::{IntoDiagnostic, Report};
 use serde_json::Value;
 
 /// Number of pictures.
-pub const COUNT: usize = 5;
+pub const PICTURE_COUNT: usize = 5;
 /// Columns of a sheet.
-const COLUMNS: usize = 5;
+const SHEET_COLUMNS: usize = 5;
 /// Bodies sampled for them: neighbouring frames of a motion would show the same pose twice.
 const CANDIDATES: usize = 8;
 
-const VIEWS: [View; 2] = [View::ThreeQuarter, View::Back];
+const GALLERY_VIEWS: [View; 2] = [View::ThreeQuarter, View::Back];
 
 /// A garment by its index on every layer, and the body.
 type Outfit = (Vec<usize>, BodySample);
 
 pub fn picture_count(evaluator: &Evaluator<'_>) -> usize {
-    if evaluator.counts.gallery { COUNT } else { 0 }
+    if evaluator.counts.gallery { PICTURE_COUNT } else { 0 }
 }
 
 /// All galleries, of test garments where there are some of their kind.
@@ -51,9 +51,9 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     let number = |g| three.iter().position(|other| *other == g).map_or(0, |i| i + 1).to_string();
     let stack = [legs(0), shirt, skirt(0), over(0), over(1)];
     let outer = |n: usize| if n.is_multiple_of(2) { over(n / 2) } else { skirt(n / 2) };
-    let numbered = |what: &str| (1..=COLUMNS).map(|i| format!("{what} {i}")).collect::<Vec<_>>();
+    let numbered = |what: &str| (1..=SHEET_COLUMNS).map(|i| format!("{what} {i}")).collect::<Vec<_>>();
 
-    let sheets: [(_, _, Vec<String>, Vec<Outfit>); COUNT] = [
+    let sheets: [(_, _, Vec<String>, Vec<Outfit>); PICTURE_COUNT] = [
         (
             "orders",
             "The same three garments in different orders, inner to outer; numbers as in the legend.",
@@ -75,14 +75,16 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
         (
             "layers",
             "Garments put on one after the other.",
-            (1..=COLUMNS).map(|n| if n == 1 { "1 layer".into() } else { format!("{n} layers") }).collect(),
-            (1..=COLUMNS).map(|n| (stack[..n].to_vec(), bodies[0].clone())).collect(),
+            (1..=SHEET_COLUMNS)
+                .map(|n| if n == 1 { "1 layer".into() } else { format!("{n} layers") })
+                .collect(),
+            (1..=SHEET_COLUMNS).map(|n| (stack[..n].to_vec(), bodies[0].clone())).collect(),
         ),
         (
             "outer",
             "Different garments over the same two.",
             numbered("outer garment"),
-            (0..COLUMNS).map(|n| (vec![legs(0), shirt, outer(n)], bodies[1].clone())).collect(),
+            (0..SHEET_COLUMNS).map(|n| (vec![legs(0), shirt, outer(n)], bodies[1].clone())).collect(),
         ),
     ];
     let picture = |(name, caption, columns, outfits): (&str, &str, _, Vec<Outfit>)| {
@@ -102,13 +104,13 @@ fn unlike(mut bodies: Vec<BodySample>) -> Vec<BodySample> {
         let turned = a.pose.rotations.iter().flatten().zip(b.pose.rotations.iter().flatten());
         turned.map(|(a, b)| (a - b) * (a - b)).sum()
     };
-    for taken in 1..COLUMNS.min(bodies.len()) {
+    for taken in 1..SHEET_COLUMNS.min(bodies.len()) {
         let (chosen, others) = bodies.split_at(taken);
         let least = |b: &BodySample| chosen.iter().map(|c| difference(c, b)).fold(f64::INFINITY, f64::min);
         let farthest = (0..others.len()).max_by(|a, b| least(&others[*a]).total_cmp(&least(&others[*b])));
         bodies.swap(taken, taken + farthest.unwrap_or(0));
     }
-    bodies.truncate(COLUMNS);
+    bodies.truncate(SHEET_COLUMNS);
     bodies
 }
 
@@ -152,7 +154,8 @@ fn shirt_over(model: &ModelUnderTest, skirt: usize) -> Result<usize, Report> {
 /// Outfits from left to right; seen from the front, then from the back. Where all of them hold the same garments a colour
 /// stands for a garment, otherwise for a layer.
 fn sheet(evaluator: &Evaluator<'_>, outfits: &[Outfit], columns: Vec<String>) -> Result<RgbImage, Report> {
-    let mut rows = VIEWS.map(|view| SheetRow { label: view.name().to_owned(), ..SheetRow::default() });
+    let mut rows =
+        GALLERY_VIEWS.map(|view| SheetRow { label: view.name().to_owned(), ..SheetRow::default() });
     // The first of them: legend and numbers follow its order.
     let longest = outfits.iter().rev().map(|(garments, _)| garments).max_by_key(|garments| garments.len());
     let same = longest
@@ -163,7 +166,7 @@ fn sheet(evaluator: &Evaluator<'_>, outfits: &[Outfit], columns: Vec<String>) ->
             layer_colour(found.unwrap_or(layer))
         };
         let (scene, draped) = finished(evaluator, garments, body)?;
-        for (row, view) in rows.iter_mut().zip(VIEWS) {
+        for (row, view) in rows.iter_mut().zip(GALLERY_VIEWS) {
             row.cells.push(picture_of(&scene, &draped, view, &colour));
         }
     }

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 /// Estimated before the post-process. Strain (J): mean over the garments of an outfit, which are no independent scenes.
 /// Violations: share of outer vertices, by the closest surface point.
-const BEFORE: [Metric<LayeredOutfit>; 5] = [
+const BEFORE_POST_PROCESS: [Metric<LayeredOutfit>; 5] = [
     ("strain_of_single_garments", |outfit| mean(outfit.strain.iter().map(|[single, _]| *single))),
     ("strain_in_outfit", |outfit| mean(outfit.strain.iter().map(|[_, layered]| *layered))),
     ("order_violations_of_single_garments", |outfit| outfit.violations_of_single_garments),
@@ -22,7 +22,7 @@ const BEFORE: [Metric<LayeredOutfit>; 5] = [
 ];
 
 /// Estimated after it. Time per garment, means of outfits, each on one thread.
-pub const AFTER: [Metric<Resolved>; 2] = [
+pub const AFTER_POST_PROCESS: [Metric<Resolved>; 2] = [
     ("order_violations", |resolved| resolved.certificate.order_violations),
     ("milliseconds", |resolved| mean(resolved.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()))),
 ];
@@ -119,8 +119,8 @@ fn statistics(layers: usize, outfits: &[&LayeredOutfit]) -> Value {
         // ratio of each.
         "strain": (0..layers).map(ratio).collect::<Vec<_>>(),
         "strain_median": (0..layers).map(median_ratio).collect::<Vec<_>>(),
-        "before": Estimate::of_metrics(outfits, &BEFORE),
-        "after": Estimate::of_metrics(&resolved, &AFTER),
+        "before": Estimate::of_metrics(outfits, &BEFORE_POST_PROCESS),
+        "after": Estimate::of_metrics(&resolved, &AFTER_POST_PROCESS),
         // No intersection with the body or between garments, before and after the post-process.
         "intersection_free": [
             Proportion::new(outfits.iter().map(|outfit| outfit.before.is_clear())),
@@ -152,7 +152,7 @@ fn named_rows(result: &Value) -> Vec<Value> {
 }
 
 /// The paper's Table 3: rows M = 1 to 6.
-const PAPER: [&[f64]; 6] = [
+const PAPER_TABLE_3: [&[f64]; 6] = [
     &[1.0],
     &[1.10, 1.29],
     &[1.16, 1.28, 1.33],
@@ -173,7 +173,9 @@ fn strain_table(results: &[Value]) -> Table {
         head: ["layers M".to_owned()].into_iter().chain(layers).collect(),
         rows: Vec::new(),
     };
-    for (result, paper) in results.iter().zip(PAPER.into_iter().map(Some).chain(std::iter::repeat(None))) {
+    for (result, paper) in
+        results.iter().zip(PAPER_TABLE_3.into_iter().map(Some).chain(std::iter::repeat(None)))
+    {
         for row in named_rows(result) {
             let ratios = row["strain"].as_array().into_iter().flatten();
             let medians = row["strain_median"].as_array().into_iter().flatten();

@@ -114,7 +114,7 @@ fn evaluate(evaluator: &Evaluator<'_>, scenes: &Scenes) -> Result<Value, DrapeEr
 }
 
 /// The paper's Table 2, on data that cannot be had: strain, bending, gravity, collision.
-const PAPER: [[&str; 7]; 3] = [
+const PAPER_TABLE_2: [[&str; 7]; 3] = [
     ["paper: SNUG, one model per garment", "–", "0.737", "0.115", "-0.46", "–", "0.165"],
     ["paper: ClothCombo", "–", "0.955", "0.105", "-0.478", "–", "0.62"],
     ["paper: LBS", "–", "2.177", "0.072", "-0.463", "–", "222.521"],
@@ -197,7 +197,7 @@ fn tables_of(set: &Value, with_paper: bool) -> Vec<Table> {
         ("strain over LBS", "/strain/of_means", number),
     ];
     vec![
-        PAPER.into_iter().filter(|_| with_paper).fold(means, Table::with_row),
+        PAPER_TABLE_2.into_iter().filter(|_| with_paper).fold(means, Table::with_row),
         energies("medians (95th percentiles) [J]", median_and_p95),
         table("contact", "methods", &contact)
             .with_note("Means (medians) over the scenes; pairs of triangles that intersect exactly."),

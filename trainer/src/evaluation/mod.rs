@@ -70,7 +70,7 @@ struct EvaluationPart {
     sections: fn(&Evaluator<'_>) -> Result<Vec<Section>, Report>,
 }
 
-const PARTS: [EvaluationPart; 11] = [
+const EVALUATION_PARTS: [EvaluationPart; 11] = [
     part("sets", "sets", |_| 0, sets::sections),
     part("methods", "Table 2: methods", methods::scene_count, methods::sections),
     part("embeddings", "Table 1: embeddings", embeddings::scene_count, embeddings::sections),
@@ -95,7 +95,7 @@ const fn part(
 
 /// Names of the parts of an evaluation, in their order.
 pub fn part_keys() -> impl Iterator<Item = &'static str> {
-    PARTS.iter().map(|part| part.key)
+    EVALUATION_PARTS.iter().map(|part| part.key)
 }
 
 impl Evaluation {
@@ -125,7 +125,7 @@ impl Evaluation {
             meshes,
             progress,
         };
-        let parts = || PARTS.iter().filter(|part| is_wanted(part.key));
+        let parts = || EVALUATION_PARTS.iter().filter(|part| is_wanted(part.key));
         let scenes = parts().map(|part| (part.scenes)(&evaluator)).sum();
         let mut sections = Vec::new();
         for part in parts() {

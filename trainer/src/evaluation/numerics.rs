@@ -3,7 +3,7 @@
 use super::{Evaluator, ModelUnderTest, Section, Table};
 use crate::dataset::{Dataset, HeldOut, PreparedScene};
 use crate::evaluation::equilibrium_error::mean_distance;
-use crate::evaluation::median_ms;
+use crate::evaluation::timing::{REPETITION_SECONDS, median_ms};
 use crate::inference::Draped;
 use crate::inference::networks::Networks;
 use crate::inference::reference::wide;
@@ -17,10 +17,7 @@ use miette::Report;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// Repetitions of a measurement last this long (s).
-const SECONDS: f64 = 0.05;
-
-const COLUMNS: [Column<'_>; 4] = [
+const CHOICE_COLUMNS: [Column<'_>; 4] = [
     ("choice", "/name", plain),
     ("time [ms]", "/milliseconds", number),
     ("energy [J]", "/energy", number),
@@ -99,7 +96,7 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
             "distance_mm": Value::Null,
         }));
     }
-    let table = Table::new("Numerical choices: time and error", &choices, &COLUMNS)
+    let table = Table::new("Numerical choices: time and error", &choices, &CHOICE_COLUMNS)
         .with_note("Networks: embedding and draping a scene. Losses: all of a scene with their gradient.");
     Ok(vec![Section::new("numerics", "Numerical choices", "", choices, vec![table])])
 }
@@ -110,7 +107,8 @@ fn mean_ms<I: Copy, R, E>(
     run: impl Fn(I) -> Result<R, E>,
 ) -> Result<f64, E> {
     let count = items.len() as f64;
-    let times = items.map(|item| median_ms(SECONDS, || run(item))).collect::<Result<Vec<_>, E>>()?;
+    let times =
+        items.map(|item| median_ms(REPETITION_SECONDS, || run(item))).collect::<Result<Vec<_>, E>>()?;
     Ok(times.into_iter().sum::<f64>() / count)
 }
 

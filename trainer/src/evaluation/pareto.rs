@@ -2,7 +2,8 @@
 
 use super::equilibrium_error::StateError;
 use super::page::Picture;
-use super::{Estimate, Evaluator, Metric, Section, Table, drape_by, median_ms};
+use super::timing::{REPETITION_SECONDS, median_ms};
+use super::{Estimate, Evaluator, Metric, Section, Table, drape_by};
 use crate::dataset::PreparedScene;
 use crate::inference::Draped;
 use crate::inference::layer_interaction::LayerInteraction;
@@ -28,21 +29,18 @@ const SOLVER: [usize; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// Steps of the refinement after networks and post-process.
 const REFINEMENT: [usize; 4] = [1, 2, 4, 8];
 /// Garments of an outfit.
-const LAYERS: usize = 3;
+const OUTFIT_LAYERS: usize = 3;
 /// Random stream of the scenes; outfits have the next.
-const STREAM: usize = 7;
+const PARETO_STREAM: usize = 7;
 /// Networks and post-process.
 const RESOLVED: &str = "network + post-process";
 /// How the methods of a line begin, and what it is called.
-const FAMILIES: [(&str, &str); 4] = [
+const METHOD_FAMILIES: [(&str, &str); 4] = [
     ("LBS", "LBS"),
     (RESOLVED, "network, post-process, refinement"),
     ("network", "network"),
     ("solver", "solver from LBS + shape transfer"),
 ];
-/// Repetitions of a fast method last this long (s).
-const SECONDS: f64 = 0.05;
-
 /// One method on one scene.
 #[derive(Serialize)]
 struct MethodSample {
@@ -61,7 +59,7 @@ struct MethodSample {
 }
 
 /// What is estimated of a method.
-const METRICS: [Metric<MethodSample>; 7] = [
+const METHOD_METRICS: [Metric<MethodSample>; 7] = [
     ("milliseconds", |s| s.milliseconds),
     ("excess", |s| s.error.excess),
     ("excess_percent", |s| s.error.excess_percent),
@@ -82,16 +80,17 @@ struct TimedState {
 /// a time; the solver and the refinement on one thread per scene.
 pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     let [scenes, outfits] = evaluator.counts.pareto;
-    let single_garments = Comparison::new(evaluator, STREAM, 1, scenes)?;
-    let outfits = Comparison::new(evaluator, STREAM + 1, LAYERS, outfits)?;
+    let single_garments = Comparison::new(evaluator, PARETO_STREAM, 1, scenes)?;
+    let outfits = Comparison::new(evaluator, PARETO_STREAM + 1, OUTFIT_LAYERS, outfits)?;
     let tables = vec![
         single_garments.table("Speed against error, one garment"),
-        outfits.table(&format!("Speed against error, {LAYERS} garments")),
+        outfits.table(&format!("Speed against error, {OUTFIT_LAYERS} garments")),
     ];
     let mut charts = single_garments.charts("one garment");
-    charts.extend(outfits.charts(&format!("{LAYERS} garments")));
-    let legend =
-        ChartLine::legend(&FAMILIES.map(|(_, name)| ChartLine { name: name.to_owned(), points: Vec::new() }));
+    charts.extend(outfits.charts(&format!("{OUTFIT_LAYERS} garments")));
+    let legend = ChartLine::legend(
+        &METHOD_FAMILIES.map(|(_, name)| ChartLine { name: name.to_owned(), points: Vec::new() }),
+    );
     let charts = ChartGrid { title: "Speed against error".to_owned(), legend, charts };
     let numbers = json!({ "single_garments": single_garments, "outfits": outfits });
     let mut section = Section::new("pareto", "Speed against error", "", numbers, tables);
@@ -163,16 +162,16 @@ impl Comparison {
 
     /// Excess energy, distance and intersections over time, all medians.
     fn charts(&self, of: &str) -> Vec<Chart> {
-        let family_of = |name: &str| FAMILIES.iter().position(|(prefix, _)| name.starts_with(prefix));
+        let family_of = |name: &str| METHOD_FAMILIES.iter().position(|(prefix, _)| name.starts_with(prefix));
         let chart = |quantity: &str, value: &dyn Fn(&Value) -> f64| {
             let line = |index: usize| {
                 let family = self.points.iter().filter(|p| family_of(&plain(&p["method"])) == Some(index));
                 let mut points: Vec<_> = family.map(|p| (median(p, "milliseconds"), value(p))).collect();
                 // More steps may take no longer; a line that turns back is drawn with spikes.
                 points.sort_by(|a, b| a.0.total_cmp(&b.0));
-                ChartLine { name: FAMILIES[index].1.to_owned(), points }
+                ChartLine { name: METHOD_FAMILIES[index].1.to_owned(), points }
             };
-            let lines: Vec<ChartLine> = (0..FAMILIES.len()).map(line).collect();
+            let lines: Vec<ChartLine> = (0..METHOD_FAMILIES.len()).map(line).collect();
             Chart::of_lines(of, ["time (ms)", quantity], &lines)
         };
         vec![
@@ -188,7 +187,7 @@ fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<
     let Evaluator { networks, post_process, settings, .. } = evaluator;
     // The garment is embedded in the first, unmeasured drape, as for the next frame of a motion.
     let timed = |method: &str, drape: &dyn Fn() -> Result<Draped, DrapeError>| {
-        let milliseconds = median_ms(SECONDS, drape)?;
+        let milliseconds = median_ms(REPETITION_SECONDS, drape)?;
         let positions = wide(&drape()?.posed);
         Ok::<_, DrapeError>(TimedState { method: method.to_owned(), milliseconds, positions })
     };
@@ -281,7 +280,7 @@ fn counted_steps(steps: usize) -> String {
 fn points(samples: &[Vec<MethodSample>]) -> Vec<Value> {
     let point = |method: usize| {
         let scenes: Vec<&MethodSample> = samples.iter().map(|scene| &scene[method]).collect();
-        let mut point = json!(Estimate::of_metrics(&scenes, &METRICS));
+        let mut point = json!(Estimate::of_metrics(&scenes, &METHOD_METRICS));
         point["method"] = json!(scenes[0].method);
         point
     };

@@ -14,8 +14,8 @@ use miette::{IntoDiagnostic, Report};
 use std::path::Path;
 
 /// Width and height of one picture (pixels).
-const CELL: [u32; 2] = [300, 460];
-const VIEWS: [View; 2] = [View::Front, View::Back];
+const PICTURE_SIZE: [u32; 2] = [300, 460];
+const SAMPLE_VIEWS: [View; 2] = [View::Front, View::Back];
 
 /// Draws `count` single and `count` layered validation scenes, evenly chosen, to `path`.
 ///
@@ -39,14 +39,15 @@ pub fn draw(
             rows.push(row(networks, &methods, &validation.prepare(dataset, sample)?)?);
         }
     }
-    let columns = methods.iter().flat_map(|m| VIEWS.map(|v| format!("{}, {}", m.name(), v.name()))).collect();
+    let columns =
+        methods.iter().flat_map(|m| SAMPLE_VIEWS.map(|v| format!("{}, {}", m.name(), v.name()))).collect();
     let sheet = PictureSheet { title: String::new(), columns, rows };
     save_png(&sheet.compose(), path).into_diagnostic()
 }
 
 fn row(networks: &Networks, methods: &[Method], scene: &PreparedScene) -> Result<SheetRow, Report> {
     let drapes = drape_by(networks, methods, scene)?;
-    let pictures = |d| VIEWS.map(|view| picture_of(scene, d, view, &layer_colour));
+    let pictures = |d| SAMPLE_VIEWS.map(|view| picture_of(scene, d, view, &layer_colour));
     let cells = drapes.iter().flat_map(pictures).collect();
     let garments = scene.garments.iter().enumerate();
     let legend = garments
@@ -73,5 +74,5 @@ pub(crate) fn picture_of(
     for (layer, (garment, positions)) in scene.garments.iter().zip(scene.parts(&positions)).enumerate() {
         figures.push(Figure { positions, faces: garment.garment.rest.faces(), colour: colour(layer) });
     }
-    render(&figures, view, CELL)
+    render(&figures, view, PICTURE_SIZE)
 }

@@ -12,7 +12,7 @@ use clothcombo_physics::energy::{SceneEnergy, Term, TermMap};
 use clothcombo_physics::query::{Distance, Surface};
 
 /// Vertices deeper than this inside the body count as visibly wrong (m).
-pub const DEEP: f64 = 0.005;
+pub const VISIBLE_DEPTH: f64 = 0.005;
 
 /// What one draped scene scores.
 #[derive(Clone, Debug, Default)]
@@ -45,7 +45,7 @@ pub fn score_scene(scene: &PreparedScene, body: &Surface<f64>, draped: &Draped) 
     let order = LayerOrder::NearestVertex;
     let selection = Selection { layers: &scene.contacts, order, triangles: false, body_itself: false };
     let report = Report::count(&CountedBody::new(body, Distance::ClosestPoint), &garments, &selection);
-    (score.penetration, score.order) = (report.penetration(DEEP), report.order());
+    (score.penetration, score.order) = (report.penetration(VISIBLE_DEPTH), report.order());
     score
 }
 

@@ -4,6 +4,9 @@ use crate::run::spread::Spread;
 use std::hint::black_box;
 use std::time::Instant;
 
+/// Repetitions of something fast last this long (s).
+pub const REPETITION_SECONDS: f64 = 0.05;
+
 /// Median time (ms) of `run` over at least 3 and about `seconds` of repetitions, after one to warm up.
 ///
 /// # Errors

@@ -9,7 +9,7 @@ const DISTANCE_IN_RADII: f64 = 5.0;
 /// Depth range in radii of the framed figure around its centre; geometry outside is not drawn.
 const DEPTH_IN_RADII: f64 = 3.0;
 /// Share of the picture the framed figure may fill along its tighter side.
-const FILL: f64 = 0.9;
+const FRAME_FILL: f64 = 0.9;
 
 /// A direction to look from; the subject faces +z and its left hand points to +x.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,7 +127,7 @@ impl Camera {
             [x, y].map(|value| value / (camera.distance - z).max(camera.near))
         });
         let [window_low, window_high] = bounds(seen).unwrap_or([[-0.2; 2], [0.2; 2]]);
-        let half = |axis: usize| (window_high[axis] - window_low[axis]) / (2.0 * FILL);
+        let half = |axis: usize| (window_high[axis] - window_low[axis]) / (2.0 * FRAME_FILL);
         let vertical = half(1).max(half(0) / aspect).max(1e-9);
         camera.window_centre = std::array::from_fn(|axis| 0.5 * (window_low[axis] + window_high[axis]));
         camera.window_half = [vertical * aspect, vertical];
@@ -218,7 +218,7 @@ mod tests {
                     assert!(projected.depth.abs() < 1.0);
                     reach = reach.max(projected.ndc[0].abs()).max(projected.ndc[1].abs());
                 }
-                assert!((reach - FILL).abs() < 1e-9, "{view:?} {size:?}: {reach}");
+                assert!((reach - FRAME_FILL).abs() < 1e-9, "{view:?} {size:?}: {reach}");
             }
         }
     }
@@ -232,7 +232,7 @@ mod tests {
             let dressed = frame(&[figure(&BOX), figure(&skirt)]);
             for p in BOX.iter().chain(&skirt) {
                 let [x, y] = dressed.project(*p).unwrap().ndc;
-                assert!(x.abs().max(y.abs()) <= FILL + 1e-9, "{view:?} {p:?}");
+                assert!(x.abs().max(y.abs()) <= FRAME_FILL + 1e-9, "{view:?} {p:?}");
             }
             let [alone, beside] = [frame(&[figure(&BOX)]), frame(&[figure(&BOX), figure(&gone)])];
             assert_eq!(alone.pixels_per_metre(100), beside.pixels_per_metre(100));

@@ -10,10 +10,10 @@ use super::render::render;
 use super::sheet::{LegendEntry, PictureSheet, SheetRow};
 
 /// Width and height of one view (pixels).
-const CELL: [u32; 2] = [340, 540];
+const VIEW_SIZE: [u32; 2] = [340, 540];
 /// Garments named on one line of the legend, from inner to outer.
 const NAMES_PER_LINE: usize = 3;
-const VIEWS: [View; 3] = [View::Front, View::Back, View::ThreeQuarter];
+const OUTFIT_VIEWS: [View; 3] = [View::Front, View::Back, View::ThreeQuarter];
 
 /// Positions (m) and faces of a mesh.
 pub type MeshSlices<'a> = (&'a [[f64; 3]], &'a [[u32; 3]]);
@@ -49,7 +49,7 @@ impl<'a> DressedRow<'a> {
 
 /// Draws `rows` from top to bottom under a `title`; `names` are those of the garments, which every row has.
 pub fn draw_dressed(title: &str, names: &[&str], rows: &[DressedRow<'_>]) -> RgbImage {
-    let views = rows.par_iter().flat_map(|row| VIEWS.into_par_iter().map(|view| draw_view(row, view)));
+    let views = rows.par_iter().flat_map(|row| OUTFIT_VIEWS.into_par_iter().map(|view| draw_view(row, view)));
     let views: Vec<RgbImage> = views.collect();
     let entries: Vec<LegendEntry> = names
         .iter()
@@ -61,7 +61,7 @@ pub fn draw_dressed(title: &str, names: &[&str], rows: &[DressedRow<'_>]) -> Rgb
         .chunks(NAMES_PER_LINE)
         .map(|names| SheetRow { legend: names.to_vec(), ..SheetRow::default() })
         .collect();
-    for (number, (row, cells)) in rows.iter().zip(views.chunks(VIEWS.len())).enumerate() {
+    for (number, (row, cells)) in rows.iter().zip(views.chunks(OUTFIT_VIEWS.len())).enumerate() {
         match lines.last_mut() {
             Some(last) if number == 0 && row.label.is_empty() => last.cells = cells.to_vec(),
             _ => lines.push(SheetRow {
@@ -71,7 +71,7 @@ pub fn draw_dressed(title: &str, names: &[&str], rows: &[DressedRow<'_>]) -> Rgb
             }),
         }
     }
-    let columns = VIEWS.iter().map(|view| view.name().to_owned()).collect();
+    let columns = OUTFIT_VIEWS.iter().map(|view| view.name().to_owned()).collect();
     PictureSheet { title: title.to_owned(), columns, rows: lines }.compose()
 }
 
@@ -86,7 +86,7 @@ fn draw_view(row: &DressedRow<'_>, view: View) -> RgbImage {
         colour: layer_colour(row.innermost + layer),
     });
     let figures: Vec<Figure> = std::iter::once(body).chain(garments).collect();
-    render(&figures, view, CELL)
+    render(&figures, view, VIEW_SIZE)
 }
 
 #[cfg(test)]
@@ -114,7 +114,7 @@ mod tests {
         ]
         .map(|rows| sheet(&rows));
         assert_eq!(both.dimensions(), same.dimensions());
-        assert!(first.height() > CELL[1] && both.height() > first.height() + CELL[1]);
+        assert!(first.height() > VIEW_SIZE[1] && both.height() > first.height() + VIEW_SIZE[1]);
         let differ: Vec<u32> = both
             .enumerate_pixels()
             .zip(same.pixels())
@@ -141,7 +141,9 @@ mod tests {
         };
         let layers = row.layers(&["tee", "coat"]);
         assert_eq!(layers.iter().map(|row| row.label.as_str()).collect::<Vec<_>>(), ["tee", "coat"]);
-        let middle = |row: &DressedRow<'_>| draw_view(row, View::Front).get_pixel(CELL[0] / 2, CELL[1] / 2).0;
+        let middle = |row: &DressedRow<'_>| {
+            draw_view(row, View::Front).get_pixel(VIEW_SIZE[0] / 2, VIEW_SIZE[1] / 2).0
+        };
         let [both, tee, coat] = [&row, &layers[0], &layers[1]].map(middle);
         let differ = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).any(|(a, b)| a.abs_diff(b) > 20);
         assert!(!differ(both, coat) && differ(both, tee), "{both:?} {tee:?} {coat:?}");

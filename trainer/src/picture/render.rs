@@ -27,7 +27,7 @@ const SIDE_LIMIT: u32 = 16_384;
 const FILL_BUDGET: f64 = 24.0;
 /// Distance from the middle of the picture (half pictures) beyond which a vertex is not drawn: the rasteriser counts
 /// pixels in 32 bits and must never see one that does not fit.
-const REACH: f64 = 1000.0;
+const NDC_REACH: f64 = 1000.0;
 /// In place of a vertex that is not drawn; no face refers to it.
 const NOWHERE: Projected = Projected { ndc: [0.0; 2], depth: 2.0 };
 
@@ -84,7 +84,7 @@ struct ProjectedMesh {
 
 impl ProjectedMesh {
     fn new(figure: &Figure<'_>, camera: &Camera, sample_size: [usize; 2]) -> Self {
-        let is_near = |p: &Projected| p.ndc.iter().all(|value| value.abs() < REACH);
+        let is_near = |p: &Projected| p.ndc.iter().all(|value| value.abs() < NDC_REACH);
         let projected: Vec<Option<Projected>> =
             figure.positions.iter().map(|&p| camera.project(p).filter(is_near)).collect();
         let corners = |face: &[u32; 3]| -> Option<[Projected; 3]> {

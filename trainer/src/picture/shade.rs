@@ -5,9 +5,9 @@ use image::RgbImage;
 use rayon::prelude::*;
 
 /// Key light: direction in camera coordinates (right, up, towards the camera) and strength in linear RGB.
-const KEY: ([f32; 3], [f32; 3]) = ([-0.58, 0.52, 0.63], [0.74, 0.72, 0.68]);
+const KEY_LIGHT: ([f32; 3], [f32; 3]) = ([-0.58, 0.52, 0.63], [0.74, 0.72, 0.68]);
 /// Fill light from the other side, weaker and cooler.
-const FILL: ([f32; 3], [f32; 3]) = ([0.80, 0.10, 0.59], [0.15, 0.165, 0.185]);
+const FILL_LIGHT: ([f32; 3], [f32; 3]) = ([0.80, 0.10, 0.59], [0.15, 0.165, 0.185]);
 /// Ambient light from above and from below.
 const SKY: [f32; 3] = [0.32, 0.33, 0.35];
 const GROUND: [f32; 3] = [0.16, 0.15, 0.14];
@@ -90,7 +90,7 @@ pub(super) fn shade(samples: &SurfaceSamples, colours: &[[u8; 3]]) -> RgbImage {
     let (width, height) = (samples.size[0] / factor, samples.size[1] / factor);
     let palette: Vec<[[f32; 3]; 2]> = colours.iter().map(|&colour| sides(colour)).collect();
     let offsets = contact_offsets(samples.pixels_per_metre);
-    let lights = [KEY, FILL].map(|(direction, strength)| (unit(direction), strength));
+    let lights = [KEY_LIGHT, FILL_LIGHT].map(|(direction, strength)| (unit(direction), strength));
     let half_vector = unit([lights[0].0[0], lights[0].0[1], lights[0].0[2] + 1.0]);
     let scale = 1.0 / (factor * factor) as f32;
 

@@ -5,13 +5,13 @@ use std::fmt::Write;
 
 use super::svg::{css_colour, draw_elements, fitted, text_width, write_text};
 
-const PAPER: Rgb<u8> = Rgb([250, 250, 249]);
+const SHEET_PAPER: Rgb<u8> = Rgb([250, 250, 249]);
 /// Space around text and between cells (pixels).
-const GAP: u32 = 8;
+const SHEET_GAP: u32 = 8;
 /// Font size, height of capitals and of a line (pixels).
 const TEXT: f64 = 18.0;
 const CAPITAL: u32 = 14;
-const LINE: u32 = CAPITAL + 2 * GAP;
+const SHEET_LINE: u32 = CAPITAL + 2 * SHEET_GAP;
 
 /// A colour and what it stands for.
 #[derive(Clone, Debug)]
@@ -56,41 +56,49 @@ impl PictureSheet {
             .collect();
         let heights: Vec<u32> =
             self.rows.iter().map(|row| row.cells.iter().map(RgbImage::height).max().unwrap_or(0)).collect();
-        let title_height = if self.title.is_empty() { 0 } else { LINE };
-        let heading_height = if self.columns.is_empty() { 0 } else { LINE };
-        let width = GAP + widths.iter().map(|width| width + GAP).sum::<u32>();
-        let height =
-            GAP + title_height + heading_height + heights.iter().map(|h| LINE + h + GAP).sum::<u32>();
-        let mut sheet = RgbImage::from_pixel(width, height, PAPER);
+        let title_height = if self.title.is_empty() { 0 } else { SHEET_LINE };
+        let heading_height = if self.columns.is_empty() { 0 } else { SHEET_LINE };
+        let width = SHEET_GAP + widths.iter().map(|width| width + SHEET_GAP).sum::<u32>();
+        let height = SHEET_GAP
+            + title_height
+            + heading_height
+            + heights.iter().map(|h| SHEET_LINE + h + SHEET_GAP).sum::<u32>();
+        let mut sheet = RgbImage::from_pixel(width, height, SHEET_PAPER);
 
         let mut labels = String::new();
-        let left = f64::from(GAP);
+        let left = f64::from(SHEET_GAP);
         let inner = f64::from(width) - 2.0 * left;
-        let mut top = GAP;
+        let mut top = SHEET_GAP;
         if !self.title.is_empty() {
             let title = fitted(&self.title, inner, TEXT);
             write_text(&mut labels, "label", [left, f64::from(top + CAPITAL)], TEXT, &title);
             top += title_height;
         }
-        let mut x = GAP;
+        let mut x = SHEET_GAP;
         for (heading, &column_width) in self.columns.iter().zip(&widths) {
             let heading = fitted(heading, f64::from(column_width), TEXT);
             let middle = f64::from(x) + 0.5 * f64::from(column_width);
-            write_text(&mut labels, "heading", [middle, f64::from(top + GAP + CAPITAL)], TEXT, &heading);
-            x += column_width + GAP;
+            write_text(
+                &mut labels,
+                "heading",
+                [middle, f64::from(top + SHEET_GAP + CAPITAL)],
+                TEXT,
+                &heading,
+            );
+            x += column_width + SHEET_GAP;
         }
         top += heading_height;
 
         for (row, row_height) in self.rows.iter().zip(heights) {
-            row.write_label(&mut labels, [left, f64::from(top + GAP)], inner);
-            top += LINE;
-            let mut x = GAP;
+            row.write_label(&mut labels, [left, f64::from(top + SHEET_GAP)], inner);
+            top += SHEET_LINE;
+            let mut x = SHEET_GAP;
             for (cell, column_width) in row.cells.iter().zip(&widths) {
                 let indent = (column_width - cell.width()) / 2;
                 image::imageops::replace(&mut sheet, cell, i64::from(x + indent), i64::from(top));
-                x += column_width + GAP;
+                x += column_width + SHEET_GAP;
             }
-            top += row_height + GAP;
+            top += row_height + SHEET_GAP;
         }
         draw_elements(&mut sheet, &labels, 1.0);
         sheet
@@ -100,7 +108,7 @@ impl PictureSheet {
 impl SheetRow {
     /// The label, then as many legend entries as fit into `width` pixels.
     fn write_label(&self, labels: &mut String, [left, top]: [f64; 2], width: f64) {
-        let [gap, patch] = [GAP, CAPITAL].map(f64::from);
+        let [gap, patch] = [SHEET_GAP, CAPITAL].map(f64::from);
         let baseline = top + patch;
         let label = fitted(&self.label, width, TEXT);
         write_text(labels, "label", [left, baseline], TEXT, &label);
@@ -155,7 +163,7 @@ mod tests {
         let picture = PictureSheet { rows: vec![row], ..PictureSheet::default() }.compose();
         assert_eq!(count(&picture, Rgb([1, 2, 3])), 0);
         let empty = PictureSheet::default().compose();
-        assert_eq!(count(&empty, PAPER), (empty.width() * empty.height()) as usize);
+        assert_eq!(count(&empty, SHEET_PAPER), (empty.width() * empty.height()) as usize);
         let only_labels =
             PictureSheet { title: "t".into(), columns: vec![], rows: vec![SheetRow::default()] };
         assert!(only_labels.compose().width() > 0);

@@ -17,10 +17,10 @@ pub struct Difference {
 }
 
 /// Longest value that is shown whole (characters).
-const SHOWN: usize = 60;
+const SHOWN_VALUE: usize = 60;
 
 /// Most differences that are shown.
-const MOST: usize = 12;
+const MOST_LISTED: usize = 12;
 
 impl Difference {
     /// The difference in words, the configurations being called `first` and `second`.
@@ -36,7 +36,7 @@ impl Difference {
 /// `lines` one below the other, each begun anew; many are cut short.
 pub fn listed<T: fmt::Display>(lines: impl IntoIterator<Item = T>) -> String {
     let lines: Vec<String> = lines.into_iter().map(|line| format!("\n  {line}")).collect();
-    let more = lines.len().saturating_sub(MOST);
+    let more = lines.len().saturating_sub(MOST_LISTED);
     let end = if more > 0 { format!("\n  … and {more} more") } else { String::new() };
     lines[..lines.len() - more].concat() + &end
 }
@@ -79,9 +79,9 @@ fn walk(path: &str, first: Option<&Value>, second: Option<&Value>, found: &mut V
 fn short(value: &Value) -> String {
     let text = value.to_string();
     match (value, text.chars().count()) {
-        (_, length) if length <= SHOWN => text,
+        (_, length) if length <= SHOWN_VALUE => text,
         (Value::Array(list), _) => format!("{} elements", list.len()),
-        _ => text.chars().take(SHOWN).chain("…".chars()).collect(),
+        _ => text.chars().take(SHOWN_VALUE).chain("…".chars()).collect(),
     }
 }
 

@@ -7,7 +7,7 @@ pub use error::RunDirError;
 use crate::config::{Config, load, to_toml};
 use crate::dataset::SplitNames;
 use crate::run::difference::{AllowedChanges, differences, differing_keys};
-use crate::run::lock::{FILE, RunLock};
+use crate::run::lock::{LOCK_FILE, RunLock};
 use crate::system::files::check_writable;
 use crate::system::paths::obstacle;
 use clothcombo_data::format::atomic::{self, Temporary};
@@ -84,11 +84,11 @@ impl RunDir {
     /// # Errors
     /// When a run or something else does.
     fn refuse_occupied(root: &Path) -> Result<(), RunDirError> {
-        if root.join(CONFIG).exists() {
+        if root.join(CONFIG_FILE).exists() {
             return Err(RunDirError::Occupied { path: root.to_owned() });
         }
         // What a start leaves that was killed before there was a configuration.
-        let own = [FILE, CHECKPOINTS, SAMPLES].map(OsStr::new);
+        let own = [LOCK_FILE, CHECKPOINTS_FOLDER, SAMPLES_FOLDER].map(OsStr::new);
         let entries = fs::read_dir(root).into_iter().flatten().flatten().map(|entry| entry.file_name());
         match entries.filter(|name| !own.contains(&name.as_os_str())).min() {
             Some(entry) => Err(RunDirError::Foreign { path: root.to_owned(), entry: entry.into() }),
@@ -103,7 +103,7 @@ impl RunDir {
     /// When there is no run, another process trains in it, or its configuration differs elsewhere (the differing keys are
     /// named).
     pub fn resume(root: &Path, config: &Config, allowed: &[String]) -> Result<Self, RunDirError> {
-        if !root.join(CONFIG).exists() {
+        if !root.join(CONFIG_FILE).exists() {
             return Err(RunDirError::Missing { path: root.to_owned() });
         }
         let run = Self::locked(root)?;
@@ -169,7 +169,7 @@ impl RunDir {
     }
     /// Every value that was used.
     pub fn config(&self) -> PathBuf {
-        self.root.join(CONFIG)
+        self.root.join(CONFIG_FILE)
     }
     /// One JSON object per step.
     pub fn metrics(&self) -> PathBuf {
@@ -189,7 +189,7 @@ impl RunDir {
     }
     /// Sample pictures.
     pub fn samples(&self) -> PathBuf {
-        self.root.join(SAMPLES)
+        self.root.join(SAMPLES_FOLDER)
     }
     /// The sample picture after `step`.
     pub fn sample(&self, step: u64) -> PathBuf {
@@ -213,14 +213,14 @@ impl RunDir {
     }
     /// Checkpoints.
     pub fn checkpoints(&self) -> PathBuf {
-        self.root.join(CHECKPOINTS)
+        self.root.join(CHECKPOINTS_FOLDER)
     }
 }
 
-/// Name of the run's configuration.
-const CONFIG: &str = "config.toml";
-const CHECKPOINTS: &str = "checkpoints";
-const SAMPLES: &str = "samples";
+/// Name of the configuration of a run, and of a checkpoint.
+pub const CONFIG_FILE: &str = "config.toml";
+const CHECKPOINTS_FOLDER: &str = "checkpoints";
+const SAMPLES_FOLDER: &str = "samples";
 
 /// Removes files of `folder` that a killed process had not finished writing; nobody else writes there now.
 fn sweep(folder: &Path) {

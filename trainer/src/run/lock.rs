@@ -9,10 +9,10 @@ use std::path::Path;
 use std::time::Duration;
 
 /// Its name in the run's folder.
-pub(super) const FILE: &str = "lock";
+pub(super) const LOCK_FILE: &str = "lock";
 
 /// Looks at a held lock before it counts as held: a program that only asks whether a run is alive holds it for an instant.
-const ATTEMPTS: u32 = 5;
+const LOCK_ATTEMPTS: u32 = 5;
 
 /// The right to write into a run folder.
 #[derive(Debug)]
@@ -26,7 +26,7 @@ impl RunLock {
     /// # Errors
     /// When another process holds it, or the file cannot be written.
     pub fn acquire(root: &Path) -> Result<Self, RunDirError> {
-        let path = root.join(FILE);
+        let path = root.join(LOCK_FILE);
         let failed = |reason| RunDirError::Io { path: path.clone(), reason };
         let mut file = OpenOptions::new()
             .read(true)
@@ -35,10 +35,10 @@ impl RunLock {
             .truncate(false)
             .open(&path)
             .map_err(failed)?;
-        for attempt in 1..=ATTEMPTS {
+        for attempt in 1..=LOCK_ATTEMPTS {
             match file.try_lock() {
                 Ok(()) => break,
-                Err(TryLockError::WouldBlock) if attempt == ATTEMPTS => {
+                Err(TryLockError::WouldBlock) if attempt == LOCK_ATTEMPTS => {
                     let mut owner = String::new();
                     let _ = file.read_to_string(&mut owner);
                     let owner =
@@ -67,7 +67,7 @@ impl RunLock {
 
     /// Whether some process holds the lock of `root`.
     pub fn is_held(root: &Path) -> bool {
-        let Ok(file) = File::open(root.join(FILE)) else { return false };
+        let Ok(file) = File::open(root.join(LOCK_FILE)) else { return false };
         matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
     }
 }

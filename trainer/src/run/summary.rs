@@ -4,7 +4,7 @@ use crate::config::{Config, load};
 use crate::dataset::ValidationGroup;
 use crate::picture::chart::median_of_last;
 use crate::run::checkpoint::{Checkpoint, CheckpointError};
-use crate::run::folder::RunDir;
+use crate::run::folder::{CONFIG_FILE, RunDir};
 use crate::run::lock::RunLock;
 use crate::run::observer::History;
 use crate::run::report::run_name;
@@ -90,7 +90,7 @@ impl FoundRun {
             Err(CheckpointError::Missing { .. }) => Ok(None),
             found => found.map(Some),
         };
-        let config = load(&root.join(CONFIG), &[]).map_err(|error| error.to_string());
+        let config = load(&root.join(CONFIG_FILE), &[]).map_err(|error| error.to_string());
         let unreadable = |error: String| {
             let (name, path) = (run_name(root), root.to_owned());
             Self::Unreadable(UnreadableRun { name, path, state: "unreadable", error })
@@ -121,11 +121,10 @@ impl FoundRun {
     }
 }
 
-const CONFIG: &str = "config.toml";
 /// What only a run has.
 const MARKS: [&str; 3] = ["checkpoints", "lock", "metrics.jsonl"];
 /// Logged steps whose median is shown.
-const LAST: usize = 100;
+const LAST_STEPS: usize = 100;
 
 impl RunSummary {
     /// Reads the run in `root`, whose configuration is `config`.
@@ -146,8 +145,8 @@ impl RunSummary {
             step,
             total_steps,
             stage,
-            loss: median_of_last(history.points("loss"), LAST),
-            seconds_per_step: median_of_last(history.points("seconds"), LAST),
+            loss: median_of_last(history.points("loss"), LAST_STEPS),
+            seconds_per_step: median_of_last(history.points("seconds"), LAST_STEPS),
             skipped: history.skipped.len(),
             spikes: history.spikes.len(),
             best_step,
@@ -186,7 +185,7 @@ impl RunSummary {
 /// When the folder cannot be listed.
 pub fn find_runs(folder: &Path) -> io::Result<Vec<FoundRun>> {
     // A folder of runs may have one that is called checkpoints.
-    if folder.join(CONFIG).exists()
+    if folder.join(CONFIG_FILE).exists()
         && let Some(run) = FoundRun::read(folder)
     {
         return Ok(vec![run]);
@@ -209,13 +208,13 @@ mod tests {
         for (name, config) in [("broken", Some("seed = ")), ("lost", None)] {
             std::fs::create_dir_all(folder.path().join(name).join("checkpoints")).unwrap();
             if let Some(config) = config {
-                std::fs::write(folder.path().join(name).join(CONFIG), config).unwrap();
+                std::fs::write(folder.path().join(name).join(CONFIG_FILE), config).unwrap();
             }
         }
         let [cut, empty] = ["cut", "damaged/checkpoints/step-00000001"].map(|name| folder.path().join(name));
         [&cut, &empty].iter().for_each(|path| std::fs::create_dir_all(path).unwrap());
         std::fs::write(cut.join("lock"), "process 1\n").unwrap();
-        std::fs::write(folder.path().join("damaged").join(CONFIG), SMALL).unwrap();
+        std::fs::write(folder.path().join("damaged").join(CONFIG_FILE), SMALL).unwrap();
         std::fs::create_dir(folder.path().join("no run")).unwrap();
         let runs = find_runs(folder.path()).unwrap();
         assert_eq!(runs.iter().map(FoundRun::name).collect::<Vec<_>>(), ["broken", "cut", "damaged", "lost"]);
@@ -238,7 +237,7 @@ mod tests {
         std::fs::create_dir_all(root.join("checkpoints")).unwrap();
         let broken = FoundRun::read(&root).unwrap();
         assert!(serde_json::to_string(&broken).unwrap().contains("run-\u{fffd}"));
-        std::fs::write(root.join(CONFIG), SMALL).unwrap();
+        std::fs::write(root.join(CONFIG_FILE), SMALL).unwrap();
         let whole = FoundRun::read(&root).unwrap();
         assert!(matches!(whole, FoundRun::Whole(_)), "{whole:?}");
         assert!(serde_json::to_string(&whole).unwrap().contains("run-\u{fffd}"));

@@ -101,7 +101,7 @@ impl ValidationReport {
 }
 
 /// What a table for the terminal shows of a method: headings, widths, cells.
-const COLUMNS: [(&str, usize, fn(&MethodScore) -> String); 10] = [
+const METHOD_COLUMNS: [(&str, usize, fn(&MethodScore) -> String); 10] = [
     ("total", 10, |m| format!("{:.3}", m.total.mean)),
     ("median", 10, |m| format!("{:.3}", m.total.median)),
     ("strain", 10, |m| format!("{:.3}", m.raw_mean(Term::Strain))),
@@ -125,12 +125,12 @@ impl fmt::Display for ValidationReport {
         for group in &self.groups {
             writeln!(f, "{} ({} scenes; energies raw in J, mean per scene)", group.group, group.scenes)?;
             write!(f, "  {:<21}", "method")?;
-            for (heading, width, _) in COLUMNS {
+            for (heading, width, _) in METHOD_COLUMNS {
                 write!(f, "{heading:>width$}")?;
             }
             for method in &group.methods {
                 write!(f, "\n  {:<21}", method.method)?;
-                for (_, width, text) in COLUMNS {
+                for (_, width, text) in METHOD_COLUMNS {
                     write!(f, "{:>width$}", text(method))?;
                 }
             }

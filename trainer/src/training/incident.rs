@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Version of the file; others are refused.
-const FORMAT: u32 = 2;
+const INCIDENT_FORMAT: u32 = 2;
 
 /// A step whose loss or gradient was not finite.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -142,7 +142,7 @@ impl Incident {
         let weights_checksum = checksum(&folder.join(&weights)).map_err(|e| unusable(&e))?;
         let stage = &around.config.stages[around.at.stage];
         let incident = Self {
-            format: FORMAT,
+            format: INCIDENT_FORMAT,
             step: around.step,
             stage: stage.name.clone(),
             trains: stage.trains,
@@ -172,8 +172,8 @@ impl Incident {
         let tree: serde_json::Value =
             serde_json::from_str(&text).map_err(|e| unusable(path, &format!("is no incident: {e}")))?;
         match tree["format"].as_u64() {
-            Some(version) if version == u64::from(FORMAT) => {}
-            _ => return Err(unusable(path, &format!("is no incident of version {FORMAT}"))),
+            Some(version) if version == u64::from(INCIDENT_FORMAT) => {}
+            _ => return Err(unusable(path, &format!("is no incident of version {INCIDENT_FORMAT}"))),
         }
         let incident: Self = serde_json::from_value(tree).map_err(|e| unusable(path, &e))?;
         match incident.scenes.iter().all(|s| !s.garments.is_empty() && !s.bodies.is_empty()) {

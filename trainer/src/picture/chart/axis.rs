@@ -7,7 +7,7 @@ const LOG_RATIO: f64 = 3.0;
 /// Decades shown at most below the largest value.
 const DECADES: f64 = 9.0;
 /// Free space beyond the extreme values, as a share of the axis.
-const MARGIN: f64 = 0.07;
+const AXIS_MARGIN: f64 = 0.07;
 
 /// An axis over a fixed range.
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ impl ChartAxis {
         let positive = drawable.filter(|&value| value > 1.0 / DRAWABLE_LIMIT).fold(f64::INFINITY, f64::min);
         if low >= 0.0 && positive.is_finite() && high > LOG_RATIO * positive {
             let (low, high) = (positive.log10().max(high.log10() - DECADES), high.log10());
-            let margin = MARGIN * (high - low);
+            let margin = AXIS_MARGIN * (high - low);
             return Self {
                 low: 10_f64.powf(low - margin),
                 high: 10_f64.powf(high + margin),
@@ -44,7 +44,7 @@ impl ChartAxis {
             };
         }
         let (low, high) = widened(low, high);
-        let margin = MARGIN * (high - low);
+        let margin = AXIS_MARGIN * (high - low);
         Self { low: low - margin, high: high + margin, is_logarithmic: false }
     }
 

@@ -1,17 +1,17 @@
 //! Stacked bars: what a whole consists of, a bar per whole.
 
-use super::{LegendKey, MARGIN, PAPER, SCALE, TEXT_SIZE, legend, legend_height};
+use super::{CHART_PAPER, LegendKey, SCALE, TEXT_MARGIN, TEXT_SIZE, legend, legend_height};
 use crate::picture::palette::{LAYER_COLOURS, layer_colour};
 use crate::picture::svg::{css_colour, draw_elements, fitted, write_text};
 use image::RgbImage;
 use std::fmt::Write;
 
-const WIDTH: f64 = 775.0;
+const BARS_WIDTH: f64 = 775.0;
 /// Space for a bar's label on its left and its total on its right.
 const LABEL: f64 = 300.0;
 const TOTAL: f64 = 85.0;
 const BAR: f64 = 20.0;
-const STEP: f64 = BAR + 8.0;
+const BAR_STEP: f64 = BAR + 8.0;
 
 /// One whole and its parts.
 #[derive(Clone, Debug, Default)]
@@ -28,21 +28,27 @@ pub struct Bar {
 pub fn draw_bars(title: &str, parts: &[&str], bars: &[Bar]) -> RgbImage {
     let keys: Vec<LegendKey> =
         parts.iter().enumerate().map(|(part, name)| LegendKey::area(&colour(part), name)).collect();
-    let top = 30.0 + legend_height(&keys, WIDTH);
-    let bottom = top + STEP * bars.len() as f64;
-    let (left, length) = (MARGIN + LABEL, WIDTH - 2.0 * MARGIN - LABEL - TOTAL);
-    let mut svg = legend(&keys, [MARGIN, 30.0], WIDTH);
-    write_text(&mut svg, "title", [MARGIN, 19.0], 14.0, &fitted(title, WIDTH - 2.0 * MARGIN, 14.0));
+    let top = 30.0 + legend_height(&keys, BARS_WIDTH);
+    let bottom = top + BAR_STEP * bars.len() as f64;
+    let (left, length) = (TEXT_MARGIN + LABEL, BARS_WIDTH - 2.0 * TEXT_MARGIN - LABEL - TOTAL);
+    let mut svg = legend(&keys, [TEXT_MARGIN, 30.0], BARS_WIDTH);
+    write_text(
+        &mut svg,
+        "title",
+        [TEXT_MARGIN, 19.0],
+        14.0,
+        &fitted(title, BARS_WIDTH - 2.0 * TEXT_MARGIN, 14.0),
+    );
     for percent in [0, 25, 50, 75, 100] {
         let x = left + length * f64::from(percent) / 100.0;
         let _ = write!(svg, r#"<path class="grid" d="M{x} {top}V{bottom}"/>"#);
         write_text(&mut svg, "x", [x, bottom + 12.0], TEXT_SIZE, &format!("{percent} %"));
     }
     for (row, bar) in bars.iter().enumerate() {
-        let y = top + STEP * row as f64 + 0.5 * (STEP - BAR);
-        let label = fitted(&bar.label, LABEL - MARGIN, TEXT_SIZE);
-        write_text(&mut svg, "label", [MARGIN, y + 13.5], TEXT_SIZE, &label);
-        write_text(&mut svg, "label", [left + length + MARGIN, y + 13.5], TEXT_SIZE, &bar.total);
+        let y = top + BAR_STEP * row as f64 + 0.5 * (BAR_STEP - BAR);
+        let label = fitted(&bar.label, LABEL - TEXT_MARGIN, TEXT_SIZE);
+        write_text(&mut svg, "label", [TEXT_MARGIN, y + 13.5], TEXT_SIZE, &label);
+        write_text(&mut svg, "label", [left + length + TEXT_MARGIN, y + 13.5], TEXT_SIZE, &bar.total);
         let sizes = bar.parts.iter().map(|part| if part.is_finite() { part.max(0.0) } else { 0.0 });
         let sum: f64 = sizes.clone().sum();
         let mut x = left;
@@ -52,8 +58,8 @@ pub fn draw_bars(title: &str, parts: &[&str], bars: &[Bar]) -> RgbImage {
             x += width;
         }
     }
-    let [width, height] = [WIDTH, bottom + 24.0].map(|side| (SCALE * side).round() as u32);
-    let mut picture = RgbImage::from_pixel(width, height, PAPER);
+    let [width, height] = [BARS_WIDTH, bottom + 24.0].map(|side| (SCALE * side).round() as u32);
+    let mut picture = RgbImage::from_pixel(width, height, CHART_PAPER);
     draw_elements(&mut picture, &svg, SCALE as f32);
     picture
 }
@@ -81,7 +87,7 @@ mod tests {
                 [&full, &legend].map(|picture| picture.pixels().filter(|p| **p == colour).count());
             (all - keys) as f64
         };
-        let length = SCALE * (WIDTH - 2.0 * MARGIN - LABEL - TOTAL);
+        let length = SCALE * (BARS_WIDTH - 2.0 * TEXT_MARGIN - LABEL - TOTAL);
         let bar = length * SCALE * BAR;
         assert!(((count(0) + count(2)) / bar - 1.0).abs() < 3e-3 && count(1) == 0.0);
         assert!((count(0) / bar - 0.75).abs() < 3e-3);

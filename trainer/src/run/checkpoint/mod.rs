@@ -25,7 +25,7 @@ pub use trained::{ModelFiles, TrainedModel};
 use crate::config::{Config, load, to_toml};
 use crate::dataset::DataList;
 use crate::run::difference::{Difference, differences};
-use crate::run::folder::RunDir;
+use crate::run::folder::{CONFIG_FILE, RunDir};
 use burn::module::Module;
 use burn::optim::ModuleOptimizer;
 use burn::store::{ModuleRecord, ModuleSnapshot, SafetensorsStore};
@@ -39,11 +39,10 @@ use std::path::{Path, PathBuf};
 const MODEL_EXCHANGE: &str = "model.safetensors";
 const MODEL_EXACT: &str = "model.bpk";
 const AVERAGE: &str = "average.bpk";
-const DATA: &str = "data.json";
+const DATA_LIST: &str = "data.json";
 const OPTIMIZER: &str = "optimizer.bpk";
-const CONFIG: &str = "config.toml";
 const STATE: &str = "state.json";
-const REQUIRED: [&str; 4] = [MODEL_EXCHANGE, MODEL_EXACT, OPTIMIZER, CONFIG];
+const REQUIRED_FILES: [&str; 4] = [MODEL_EXCHANGE, MODEL_EXACT, OPTIMIZER, CONFIG_FILE];
 
 /// What training consists of at one moment.
 pub struct Snapshot<'a> {
@@ -80,7 +79,7 @@ impl Checkpoint {
         let folder = run.checkpoints();
         let name = retention::name(state.step);
         let path = folder.join(&name);
-        let temporary = Temporary::new(folder.join(format!("{name}{}", retention::TEMPORARY)));
+        let temporary = Temporary::new(folder.join(format!("{name}{}", retention::TEMPORARY_ENDING)));
         let failed = |reason: String| CheckpointError::Write { path: path.clone(), reason };
         let io_failed = |e: io::Error| failed(e.to_string());
 
@@ -112,7 +111,7 @@ impl Checkpoint {
     /// As [`Self::open`].
     pub fn open_until(path: &Path, step: u64) -> Result<Self, CheckpointError> {
         newest(path, step, |folder| {
-            let state = read_state(folder, &REQUIRED)?;
+            let state = read_state(folder, &REQUIRED_FILES)?;
             state.checksums.keys().try_for_each(|file| verify(folder, &state, file))?;
             Ok(Self { path: folder.to_owned(), state })
         })
@@ -123,7 +122,7 @@ impl Checkpoint {
     /// # Errors
     /// When it cannot be read.
     pub fn config(&self) -> Result<Config, CheckpointError> {
-        Ok(load(&self.path.join(CONFIG), &[])?)
+        Ok(load(&self.path.join(CONFIG_FILE), &[])?)
     }
 
     /// The networks for use, on `device`: the average of the trained ones where the run keeps one.
@@ -174,7 +173,7 @@ impl Checkpoint {
 
     /// What its data consisted of; `None` in a checkpoint of an early version.
     pub fn data(&self) -> Option<DataList> {
-        serde_json::from_slice(&fs::read(self.path.join(DATA)).ok()?).ok()
+        serde_json::from_slice(&fs::read(self.path.join(DATA_LIST)).ok()?).ok()
     }
 
     /// `optimizer` with the stored moments.
@@ -274,17 +273,17 @@ fn write(
     snapshot.average.unwrap_or(snapshot.model).save_into(&mut exchange).map_err(|e| e.to_string())?;
     save_model(snapshot.model, &folder.join(MODEL_EXACT))?;
     snapshot.optimizer.save(folder.join(OPTIMIZER)).map_err(|e| e.to_string())?;
-    fs::write(folder.join(CONFIG), to_toml(config).map_err(|e| e.to_string())?).map_err(text)?;
-    fs::write(folder.join(DATA), serde_json::to_vec(snapshot.data).map_err(|e| e.to_string())?)
+    fs::write(folder.join(CONFIG_FILE), to_toml(config).map_err(|e| e.to_string())?).map_err(text)?;
+    fs::write(folder.join(DATA_LIST), serde_json::to_vec(snapshot.data).map_err(|e| e.to_string())?)
         .map_err(text)?;
-    let mut files = REQUIRED.to_vec();
-    files.push(DATA);
+    let mut files = REQUIRED_FILES.to_vec();
+    files.push(DATA_LIST);
     if let Some(average) = snapshot.average {
         save_model(average, &folder.join(AVERAGE))?;
         files.push(AVERAGE);
     }
     // The exchange file is written as private to its owner; it may be read by whom the others may be read.
-    let usual = fs::metadata(folder.join(CONFIG)).map_err(text)?.permissions();
+    let usual = fs::metadata(folder.join(CONFIG_FILE)).map_err(text)?.permissions();
     fs::set_permissions(folder.join(MODEL_EXCHANGE), usual).map_err(text)?;
     for file in &files {
         let path = folder.join(file);

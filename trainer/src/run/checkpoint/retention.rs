@@ -10,7 +10,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// Ending of what is not yet, or no longer, a checkpoint.
-pub(super) const TEMPORARY: &str = ".tmp";
+pub(super) const TEMPORARY_ENDING: &str = ".tmp";
 
 /// Name of the checkpoint folder of `step`.
 pub(super) fn name(step: u64) -> String {
@@ -59,7 +59,7 @@ pub(super) fn name_best(folder: &Path, best: Option<u64>) -> io::Result<()> {
 }
 
 fn remove(folder: &Path, step: u64) -> io::Result<()> {
-    let leaving = folder.join(format!("{}{TEMPORARY}", name(step)));
+    let leaving = folder.join(format!("{}{TEMPORARY_ENDING}", name(step)));
     let _ = fs::remove_dir_all(&leaving);
     fs::rename(folder.join(name(step)), &leaving)?;
     fs::remove_dir_all(&leaving)
@@ -70,7 +70,7 @@ pub(super) fn sweep(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok) {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        if name.starts_with("step-") && name.ends_with(TEMPORARY) {
+        if name.starts_with("step-") && name.ends_with(TEMPORARY_ENDING) {
             // It costs space and nothing else; the next sweep may have more luck.
             let _ = fs::remove_dir_all(entry.path());
         }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Version of the layout; newer ones are refused. Version 1 had no seal, no best score and no incidents: it is still read.
-pub(super) const FORMAT: u32 = 2;
+pub(super) const STATE_FORMAT: u32 = 2;
 const UNSEALED: u32 = 1;
 
 /// What a checkpoint says about itself.
@@ -55,7 +55,7 @@ impl CheckpointState {
     /// A state of the current format without checksums.
     pub fn new(step: u64, joints: Vec<String>, shape_count: usize, pose_features: usize) -> Self {
         Self {
-            format: FORMAT,
+            format: STATE_FORMAT,
             step,
             joints,
             shape_count,
@@ -120,7 +120,7 @@ impl CheckpointState {
         let damaged = |e: serde_json::Error| format!("is damaged: {e}");
         let mut tree: serde_json::Value = serde_json::from_str(text).map_err(damaged)?;
         match tree["format"].as_u64() {
-            Some(version) if version == u64::from(FORMAT) => {
+            Some(version) if version == u64::from(STATE_FORMAT) => {
                 let whole = text.rfind(SEAL_KEY).is_some_and(|at| text[at..] == seal(&text[..at]));
                 if !whole {
                     return Err("does not match its own checksum".into());
@@ -131,11 +131,13 @@ impl CheckpointState {
             Some(version) if version == u64::from(UNSEALED) && tree.get("seal").is_none() => {}
             Some(version) => {
                 return Err(format!(
-                    "has version {version}, this program reads versions {UNSEALED} and {FORMAT}"
+                    "has version {version}, this program reads versions {UNSEALED} and {STATE_FORMAT}"
                 ));
             }
             None => {
-                return Err(format!("has no version, this program reads versions {UNSEALED} and {FORMAT}"));
+                return Err(format!(
+                    "has no version, this program reads versions {UNSEALED} and {STATE_FORMAT}"
+                ));
             }
         }
         serde_json::from_value(tree).map_err(damaged)

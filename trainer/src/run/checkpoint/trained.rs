@@ -1,12 +1,12 @@
 //! A trained model, apart from the run that made it.
 
 use super::{
-    CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, STATE, newest, other_networks, read_state,
-    verify,
+    CheckpointError, CheckpointState, MODEL_EXCHANGE, STATE, newest, other_networks, read_state, verify,
 };
 use crate::config::{Config, ConfigError, PoseConfig, load, parse};
 use crate::dataset::{ClipSplit, Dataset, DatasetError, GarmentPurpose, load_body, purpose, read_body};
 use crate::run::difference::listed;
+use crate::run::folder::CONFIG_FILE;
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use burn::tensor::Device;
 use clothcombo_data::asset::Body;
@@ -56,7 +56,7 @@ impl TrainedModel {
         };
         let state = CheckpointState::read(files.state).map_err(unusable)?;
         // Paths in it are relative to the working folder.
-        let config = parse(files.config, Path::new(CONFIG), &[])?;
+        let config = parse(files.config, Path::new(CONFIG_FILE), &[])?;
         Ok(Self { folder, state, config, built_in: Some(files) })
     }
 
@@ -70,10 +70,10 @@ impl TrainedModel {
             false => path,
         };
         newest(path, u64::MAX, |folder| {
-            let files = [MODEL_EXCHANGE, CONFIG];
+            let files = [MODEL_EXCHANGE, CONFIG_FILE];
             let state = read_state(folder, &files)?;
             files.iter().try_for_each(|file| verify(folder, &state, file))?;
-            let config = load(&folder.join(CONFIG), &[])?;
+            let config = load(&folder.join(CONFIG_FILE), &[])?;
             Ok(Self { folder: folder.to_owned(), state, config, built_in: None })
         })
     }
@@ -84,8 +84,8 @@ impl TrainedModel {
     /// When an override is wrong.
     pub fn config_with(&self, overrides: &[String]) -> Result<Config, ConfigError> {
         match self.built_in {
-            Some(files) => parse(files.config, Path::new(CONFIG), overrides),
-            None => load(&self.folder.join(CONFIG), overrides),
+            Some(files) => parse(files.config, Path::new(CONFIG_FILE), overrides),
+            None => load(&self.folder.join(CONFIG_FILE), overrides),
         }
     }
 

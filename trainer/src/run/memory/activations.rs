@@ -19,9 +19,9 @@ const PER_EMBEDDING: f64 = 2.0;
 /// Per joint: weights, corrections, blended transforms.
 const PER_JOINT: f64 = 5.0;
 /// For the energies; fitted.
-const PER_VERTEX: f64 = 300.0;
+const ENERGIES_PER_VERTEX: f64 = 300.0;
 /// The rest: buffers of the operation in work, gradients in transit, and gaps that the allocator leaves.
-const MARGIN: f64 = 1.1;
+const ALLOCATOR_MARGIN: f64 = 1.1;
 
 /// Bytes of a scene of `stage` at its peak, whose garments have `vertices` vertices, `embedded` of them in distinct garments.
 pub(super) fn of_scene(
@@ -31,7 +31,8 @@ pub(super) fn of_scene(
     [vertices, embedded]: [usize; 2],
 ) -> f64 {
     let embedding = if stage.trains.freezes() { 0.0 } else { per_embedded_vertex(config) };
-    4.0 * MARGIN * (embedding * embedded as f64 + per_vertex(config, stage, joints) * vertices as f64)
+    4.0 * ALLOCATOR_MARGIN
+        * (embedding * embedded as f64 + per_vertex(config, stage, joints) * vertices as f64)
 }
 
 /// Bytes of the largest tensor of a step: the product of all modulator layers with the z_v of the largest outfit, or the mixed
@@ -65,5 +66,5 @@ fn per_vertex(config: &Config, stage: &StageConfig, joints: usize) -> f64 {
         Trains::Untangling => (sine, 2.0 * modulator),
         Trains::All => (2.0 * sine + skinning, 2.0 * modulator),
     };
-    of_garments + stage.bodies as f64 * (of_body + PER_VERTEX)
+    of_garments + stage.bodies as f64 * (of_body + ENERGIES_PER_VERTEX)
 }

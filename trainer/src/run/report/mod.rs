@@ -80,7 +80,7 @@ pub struct RunPage<'a> {
 }
 
 /// Sample sheets shown, newest first.
-const SAMPLES: usize = 2;
+const SHOWN_SAMPLES: usize = 2;
 
 /// What is shown of every method of a validation.
 const VALIDATION: [Column<'_>; 9] = [
@@ -196,7 +196,8 @@ impl RunPage<'_> {
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
             Some(figure(&name, &image(&name, &png)))
         };
-        let shown: String = self.history.samples.iter().rev().take(SAMPLES).filter_map(sample).collect();
+        let shown: String =
+            self.history.samples.iter().rev().take(SHOWN_SAMPLES).filter_map(sample).collect();
         let shown = if shown.is_empty() { "<p>none drawn yet</p>" } else { &shown };
         format!("<section id=\"samples\"><h2>Samples</h2>\n{shown}</section>\n")
     }

@@ -5,7 +5,7 @@ use super::{DeviceError, Opened, opened_name, remember};
 use burn::tensor::{Device, DeviceType};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-const HINT: &str =
+const CUDA_HINT: &str =
     "install NVIDIA's driver and check CUDA_VISIBLE_DEVICES, or compute on the processor with --device flex";
 
 /// GPU number `index`, or the first.
@@ -14,7 +14,7 @@ const HINT: &str =
 /// When there is none, or it cannot be opened.
 pub(super) fn open(index: Option<usize>) -> Result<Device, DeviceError> {
     let count = Device::enumerate(DeviceType::Cuda).len();
-    open_numbered(numbered("cuda", index, count, HINT, || listed(count))?)
+    open_numbered(numbered("cuda", index, count, CUDA_HINT, || listed(count))?)
 }
 
 /// The first GPU if there is one, for `--device auto`.

@@ -5,7 +5,7 @@ use super::{DeviceError, Opened, opened_name, remember};
 use burn::tensor::wgpu::WgpuInitError;
 use burn::tensor::{Device, DeviceKind, DeviceType};
 
-const HINT: &str = "install the GPU's Vulkan driver and the Vulkan loader (Debian: libvulkan1; mesa-vulkan-drivers for AMD and \
+const WGPU_HINT: &str = "install the GPU's Vulkan driver and the Vulkan loader (Debian: libvulkan1; mesa-vulkan-drivers for AMD and \
      Intel GPUs and for an adapter in software), or compute on the processor with --device flex";
 
 /// An adapter, as burn selects it.
@@ -39,7 +39,7 @@ fn selectors() -> Vec<Selector> {
 /// When there is none, or it cannot be opened.
 pub(super) fn open(index: Option<usize>) -> Result<Device, DeviceError> {
     let selectors = selectors();
-    let index = numbered("wgpu", index, selectors.len(), HINT, || listed(&selectors))?;
+    let index = numbered("wgpu", index, selectors.len(), WGPU_HINT, || listed(&selectors))?;
     open_selected(index, &selectors[index].1)
 }
 
@@ -64,7 +64,7 @@ fn open_selected(index: usize, selector: &DeviceKind) -> Result<Device, DeviceEr
             if api == "Gl" {
                 return Err(DeviceError::CannotOpen {
                     device: format!("wgpu:{index}"),
-                    reason: format!("{} is there through OpenGL only; {HINT}", adapter.name),
+                    reason: format!("{} is there through OpenGL only; {WGPU_HINT}", adapter.name),
                 });
             }
             let limits = setup.device.limits();
