@@ -2,7 +2,7 @@
 
 use crate::cli::output::print_report;
 use crate::cli::table::{Row, row, table};
-use crate::run::summary::{FoundRun, RunSummary, find_runs};
+use crate::run::summary::{FoundRun, RunContent, RunSummary, find_runs};
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::path::PathBuf;
@@ -54,15 +54,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         runs.sort_by(|a, b| score(a).total_cmp(&score(b)));
     }
     print_report(arguments.json, &runs, |runs| {
-        let readable = runs.iter().filter_map(|run| match run {
-            FoundRun::Whole(run) => Some(table_row(run)),
-            FoundRun::Unreadable(_) => None,
+        let readable = runs.iter().filter_map(|run| match &run.content {
+            RunContent::Whole(summary) => Some(table_row(run, summary)),
+            RunContent::Unreadable { .. } => None,
         });
         let mut text = table(&readable.collect::<Vec<_>>());
         for run in runs {
-            if let FoundRun::Unreadable(run) = run {
+            if let RunContent::Unreadable { error } = &run.content {
                 // On one line, as every run.
-                let error = run.error.split_whitespace().collect::<Vec<_>>().join(" ");
+                let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
                 text += &format!("{}  {}  {error}\n", run.name, run.state);
             }
         }
@@ -70,10 +70,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     })
 }
 
-fn table_row(r: &RunSummary) -> Row {
+fn table_row(run: &FoundRun, r: &RunSummary) -> Row {
     row! {
-        "run" => r.name,
-        "state" => r.state,
+        "run" => run.name,
+        "state" => run.state,
         "step" => format!("{}/{}", r.step, r.total_steps),
         "stage" => r.stage,
         "loss" => r.loss,

@@ -15,16 +15,37 @@ use serde_json::Value;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A run in a few numbers.
+/// A run that was found.
 #[derive(Clone, Debug, Serialize)]
-pub struct RunSummary {
+pub struct FoundRun {
     /// Name of its folder.
     pub name: String,
     /// The folder.
     #[serde(serialize_with = "lossy")]
     pub path: PathBuf,
-    /// `"running"`, `"finished"` or `"stopped"`.
+    /// `"running"`, `"finished"` or `"stopped"`; `"unreadable"` where it is damaged.
     pub state: &'static str,
+    /// What its files say.
+    #[serde(flatten)]
+    pub content: RunContent,
+}
+
+/// What the files of a run say.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum RunContent {
+    /// How it went.
+    Whole(RunSummary),
+    /// The configuration or the checkpoints cannot be read.
+    Unreadable {
+        /// What is wrong.
+        error: String,
+    },
+}
+
+/// A run in a few numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct RunSummary {
     /// Steps logged.
     pub step: u64,
     /// Steps of the whole run.
@@ -55,30 +76,6 @@ pub struct RunSummary {
     pub seed: u64,
 }
 
-/// A run whose configuration or checkpoints cannot be read.
-#[derive(Clone, Debug, Serialize)]
-pub struct UnreadableRun {
-    /// Name of its folder.
-    pub name: String,
-    /// The folder.
-    #[serde(serialize_with = "lossy")]
-    pub path: PathBuf,
-    /// `"unreadable"`.
-    pub state: &'static str,
-    /// What is wrong.
-    pub error: String,
-}
-
-/// A run that was found.
-#[derive(Clone, Debug, Serialize)]
-#[serde(untagged)]
-pub enum FoundRun {
-    /// One that says how it went.
-    Whole(Box<RunSummary>),
-    /// One that is damaged.
-    Unreadable(UnreadableRun),
-}
-
 impl FoundRun {
     /// Reads `root`; `None` if it is no run, which is a folder with checkpoints or the log of a run in it. A run whose
     /// configuration or checkpoints cannot be read is damaged.
@@ -91,32 +88,22 @@ impl FoundRun {
             found => found.map(Some),
         };
         let config = load(&root.join(CONFIG_FILE), &[]).map_err(|error| error.to_string());
-        let unreadable = |error: String| {
-            let (name, path) = (run_name(root), root.to_owned());
-            Self::Unreadable(UnreadableRun { name, path, state: "unreadable", error })
-        };
-        Some(match (config, checkpoint) {
+        let (state, content) = match (config, checkpoint) {
             (Ok(config), Ok(checkpoint)) => {
-                Self::Whole(Box::new(RunSummary::read(root, &config, checkpoint.as_ref())))
+                let summary = RunSummary::read(root, &config, checkpoint.map(|c| c.state.step));
+                (summary.state(root), RunContent::Whole(summary))
             }
-            (Err(error), _) => unreadable(error),
-            (_, Err(error)) => unreadable(error.to_string()),
-        })
-    }
-
-    /// Name of its folder.
-    pub fn name(&self) -> &str {
-        match self {
-            Self::Whole(run) => &run.name,
-            Self::Unreadable(run) => &run.name,
-        }
+            (Err(error), _) => ("unreadable", RunContent::Unreadable { error }),
+            (_, Err(error)) => ("unreadable", RunContent::Unreadable { error: error.to_string() }),
+        };
+        Some(Self { name: run_name(root), path: root.to_owned(), state, content })
     }
 
     /// Score of the best validation, if there was one.
     pub fn best_score(&self) -> Option<f64> {
-        match self {
-            Self::Whole(run) => run.best_score,
-            Self::Unreadable(_) => None,
+        match &self.content {
+            RunContent::Whole(run) => run.best_score,
+            RunContent::Unreadable { .. } => None,
         }
     }
 }
@@ -127,23 +114,14 @@ const MARKS: [&str; 3] = ["checkpoints", "lock", "metrics.jsonl"];
 const LAST_STEPS: usize = 100;
 
 impl RunSummary {
-    /// Reads the run in `root`, whose configuration is `config`.
-    fn read(root: &Path, config: &Config, checkpoint: Option<&Checkpoint>) -> Self {
+    /// Reads the run in `root`, whose configuration is `config`; `checkpoint` is the step of its newest whole one.
+    fn read(root: &Path, config: &Config, checkpoint: Option<u64>) -> Self {
         let history = History::read(&RunDir::follow(root)).unwrap_or_default();
         let (step, stage) = history.last.clone().unwrap_or_default();
         let (best_step, best_score) = history.best.unzip();
-        let (checkpoint, total_steps) = (checkpoint.map(|c| c.state.step), config.total_steps());
-        let state = match (RunLock::is_held(root), step.max(checkpoint.unwrap_or(0)) >= total_steps) {
-            (true, _) => "running",
-            (false, true) => "finished",
-            (false, false) => "stopped",
-        };
         let mut summary = Self {
-            name: run_name(root),
-            path: root.to_owned(),
-            state,
             step,
-            total_steps,
+            total_steps: config.total_steps(),
             stage,
             loss: median_of_last(history.points("loss"), LAST_STEPS),
             seconds_per_step: median_of_last(history.points("seconds"), LAST_STEPS),
@@ -163,6 +141,15 @@ impl RunSummary {
             summary.note_group(group);
         }
         summary
+    }
+
+    /// Where the run in `root` stands.
+    fn state(&self, root: &Path) -> &'static str {
+        match RunLock::is_held(root) {
+            true => "running",
+            false if self.step.max(self.checkpoint.unwrap_or(0)) >= self.total_steps => "finished",
+            false => "stopped",
+        }
     }
 
     /// Takes in a group of a validation.
@@ -217,7 +204,10 @@ mod tests {
         std::fs::write(folder.path().join("damaged").join(CONFIG_FILE), SMALL).unwrap();
         std::fs::create_dir(folder.path().join("no run")).unwrap();
         let runs = find_runs(folder.path()).unwrap();
-        assert_eq!(runs.iter().map(FoundRun::name).collect::<Vec<_>>(), ["broken", "cut", "damaged", "lost"]);
+        assert_eq!(
+            runs.iter().map(|run| run.name.as_str()).collect::<Vec<_>>(),
+            ["broken", "cut", "damaged", "lost"]
+        );
         let json = serde_json::to_value(&runs).unwrap();
         assert!((0..4).all(|i| json[i]["state"] == "unreadable"), "{json}");
         assert!(json[2]["error"].as_str().unwrap().contains("step-00000001: state.json"), "{json}");
@@ -239,7 +229,7 @@ mod tests {
         assert!(serde_json::to_string(&broken).unwrap().contains("run-\u{fffd}"));
         std::fs::write(root.join(CONFIG_FILE), SMALL).unwrap();
         let whole = FoundRun::read(&root).unwrap();
-        assert!(matches!(whole, FoundRun::Whole(_)), "{whole:?}");
+        assert!(matches!(whole.content, RunContent::Whole(_)), "{whole:?}");
         assert!(serde_json::to_string(&whole).unwrap().contains("run-\u{fffd}"));
     }
 }

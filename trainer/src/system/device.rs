@@ -13,7 +13,7 @@ mod error;
 #[cfg(feature = "wgpu")]
 mod wgpu;
 
-pub use choice::{DeviceChoice, DeviceSpelling};
+pub use choice::DeviceChoice;
 pub use error::DeviceError;
 
 use burn::tensor::Device;

@@ -4,7 +4,6 @@ use super::{DeviceError, default_device};
 use burn::tensor::Device;
 use std::fmt;
 use std::str::FromStr;
-use thiserror::Error;
 
 /// A device as a user names it. All forms exist in every build; [`open`](Self::open) says what a build lacks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -21,11 +20,6 @@ pub enum DeviceChoice {
     /// An NVIDIA GPU by CUDA's number; without one number 0.
     Cuda(Option<usize>),
 }
-
-/// A device that is spelled in none of the forms there are.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("{0:?} is no device; say auto, flex, ndarray, wgpu, wgpu:N, cuda or cuda:N, with N from 0")]
-pub struct DeviceSpelling(String);
 
 impl DeviceChoice {
     /// One device for every backend of this build, the processor first.
@@ -103,10 +97,14 @@ fn or_warn(opened: Option<Result<Device, DeviceError>>) -> Option<Device> {
 }
 
 impl FromStr for DeviceChoice {
-    type Err = DeviceSpelling;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, DeviceSpelling> {
-        let wrong = || DeviceSpelling(text.to_owned());
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!(
+                "{text:?} is no device; say auto, flex, ndarray, wgpu, wgpu:N, cuda or cuda:N, with N from 0"
+            )
+        };
         let (backend, number) = match text.split_once(':') {
             Some((backend, number)) => {
                 // `parse` alone takes a sign.
