@@ -116,7 +116,7 @@ fn run_of(path: &Path) -> Option<PathBuf> {
 pub fn main() -> ExitCode {
     let group = match ProcessGroup::join() {
         Ok(group) => Rc::new(group),
-        Err(error) => return exit_code(Err(error.into())),
+        Err(error) => return exit_code(Err(error)),
     };
     let arguments = match super::parse::<Arguments>() {
         Ok(arguments) => arguments,
