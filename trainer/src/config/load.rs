@@ -68,8 +68,8 @@ pub fn to_toml(config: &Config) -> Result<String, toml::ser::Error> {
 
 /// The beginning of an override, which may be as long as the command line.
 fn shortened(setting: &str) -> String {
-    const SHOWN_OVERRIDE: usize = 120;
-    match setting.char_indices().nth(SHOWN_OVERRIDE) {
+    const SHOWN: usize = 120;
+    match setting.char_indices().nth(SHOWN) {
         Some((end, _)) => format!("{}…", &setting[..end]),
         None => setting.to_owned(),
     }

@@ -7,11 +7,11 @@ use super::svg::{css_colour, draw_elements, fitted, text_width, write_text};
 
 const SHEET_PAPER: Rgb<u8> = Rgb([250, 250, 249]);
 /// Space around text and between cells (pixels).
-const SHEET_GAP: u32 = 8;
+const GAP: u32 = 8;
 /// Font size, height of capitals and of a line (pixels).
 const TEXT: f64 = 18.0;
 const CAPITAL: u32 = 14;
-const SHEET_LINE: u32 = CAPITAL + 2 * SHEET_GAP;
+const SHEET_LINE: u32 = CAPITAL + 2 * GAP;
 
 /// A colour and what it stands for.
 #[derive(Clone, Debug)]
@@ -58,47 +58,39 @@ impl PictureSheet {
             self.rows.iter().map(|row| row.cells.iter().map(RgbImage::height).max().unwrap_or(0)).collect();
         let title_height = if self.title.is_empty() { 0 } else { SHEET_LINE };
         let heading_height = if self.columns.is_empty() { 0 } else { SHEET_LINE };
-        let width = SHEET_GAP + widths.iter().map(|width| width + SHEET_GAP).sum::<u32>();
-        let height = SHEET_GAP
-            + title_height
-            + heading_height
-            + heights.iter().map(|h| SHEET_LINE + h + SHEET_GAP).sum::<u32>();
+        let width = GAP + widths.iter().map(|width| width + GAP).sum::<u32>();
+        let height =
+            GAP + title_height + heading_height + heights.iter().map(|h| SHEET_LINE + h + GAP).sum::<u32>();
         let mut sheet = RgbImage::from_pixel(width, height, SHEET_PAPER);
 
         let mut labels = String::new();
-        let left = f64::from(SHEET_GAP);
+        let left = f64::from(GAP);
         let inner = f64::from(width) - 2.0 * left;
-        let mut top = SHEET_GAP;
+        let mut top = GAP;
         if !self.title.is_empty() {
             let title = fitted(&self.title, inner, TEXT);
             write_text(&mut labels, "label", [left, f64::from(top + CAPITAL)], TEXT, &title);
             top += title_height;
         }
-        let mut x = SHEET_GAP;
+        let mut x = GAP;
         for (heading, &column_width) in self.columns.iter().zip(&widths) {
             let heading = fitted(heading, f64::from(column_width), TEXT);
             let middle = f64::from(x) + 0.5 * f64::from(column_width);
-            write_text(
-                &mut labels,
-                "heading",
-                [middle, f64::from(top + SHEET_GAP + CAPITAL)],
-                TEXT,
-                &heading,
-            );
-            x += column_width + SHEET_GAP;
+            write_text(&mut labels, "heading", [middle, f64::from(top + GAP + CAPITAL)], TEXT, &heading);
+            x += column_width + GAP;
         }
         top += heading_height;
 
         for (row, row_height) in self.rows.iter().zip(heights) {
-            row.write_label(&mut labels, [left, f64::from(top + SHEET_GAP)], inner);
+            row.write_label(&mut labels, [left, f64::from(top + GAP)], inner);
             top += SHEET_LINE;
-            let mut x = SHEET_GAP;
+            let mut x = GAP;
             for (cell, column_width) in row.cells.iter().zip(&widths) {
                 let indent = (column_width - cell.width()) / 2;
                 image::imageops::replace(&mut sheet, cell, i64::from(x + indent), i64::from(top));
-                x += column_width + SHEET_GAP;
+                x += column_width + GAP;
             }
-            top += row_height + SHEET_GAP;
+            top += row_height + GAP;
         }
         draw_elements(&mut sheet, &labels, 1.0);
         sheet
@@ -108,7 +100,7 @@ impl PictureSheet {
 impl SheetRow {
     /// The label, then as many legend entries as fit into `width` pixels.
     fn write_label(&self, labels: &mut String, [left, top]: [f64; 2], width: f64) {
-        let [gap, patch] = [SHEET_GAP, CAPITAL].map(f64::from);
+        let [gap, patch] = [GAP, CAPITAL].map(f64::from);
         let baseline = top + patch;
         let label = fitted(&self.label, width, TEXT);
         write_text(labels, "label", [left, baseline], TEXT, &label);

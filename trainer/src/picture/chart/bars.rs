@@ -1,6 +1,6 @@
 //! Stacked bars: what a whole consists of, a bar per whole.
 
-use super::{CHART_PAPER, LegendKey, SCALE, TEXT_MARGIN, TEXT_SIZE, legend, legend_height};
+use super::{CHART_PAPER, INSET, LegendKey, SCALE, TEXT_SIZE, legend, legend_height};
 use crate::picture::palette::{LAYER_COLOURS, layer_colour};
 use crate::picture::svg::{css_colour, draw_elements, fitted, write_text};
 use image::RgbImage;
@@ -30,15 +30,9 @@ pub fn draw_bars(title: &str, parts: &[&str], bars: &[Bar]) -> RgbImage {
         parts.iter().enumerate().map(|(part, name)| LegendKey::area(&colour(part), name)).collect();
     let top = 30.0 + legend_height(&keys, BARS_WIDTH);
     let bottom = top + BAR_STEP * bars.len() as f64;
-    let (left, length) = (TEXT_MARGIN + LABEL, BARS_WIDTH - 2.0 * TEXT_MARGIN - LABEL - TOTAL);
-    let mut svg = legend(&keys, [TEXT_MARGIN, 30.0], BARS_WIDTH);
-    write_text(
-        &mut svg,
-        "title",
-        [TEXT_MARGIN, 19.0],
-        14.0,
-        &fitted(title, BARS_WIDTH - 2.0 * TEXT_MARGIN, 14.0),
-    );
+    let (left, length) = (INSET + LABEL, BARS_WIDTH - 2.0 * INSET - LABEL - TOTAL);
+    let mut svg = legend(&keys, [INSET, 30.0], BARS_WIDTH);
+    write_text(&mut svg, "title", [INSET, 19.0], 14.0, &fitted(title, BARS_WIDTH - 2.0 * INSET, 14.0));
     for percent in [0, 25, 50, 75, 100] {
         let x = left + length * f64::from(percent) / 100.0;
         let _ = write!(svg, r#"<path class="grid" d="M{x} {top}V{bottom}"/>"#);
@@ -46,9 +40,9 @@ pub fn draw_bars(title: &str, parts: &[&str], bars: &[Bar]) -> RgbImage {
     }
     for (row, bar) in bars.iter().enumerate() {
         let y = top + BAR_STEP * row as f64 + 0.5 * (BAR_STEP - BAR);
-        let label = fitted(&bar.label, LABEL - TEXT_MARGIN, TEXT_SIZE);
-        write_text(&mut svg, "label", [TEXT_MARGIN, y + 13.5], TEXT_SIZE, &label);
-        write_text(&mut svg, "label", [left + length + TEXT_MARGIN, y + 13.5], TEXT_SIZE, &bar.total);
+        let label = fitted(&bar.label, LABEL - INSET, TEXT_SIZE);
+        write_text(&mut svg, "label", [INSET, y + 13.5], TEXT_SIZE, &label);
+        write_text(&mut svg, "label", [left + length + INSET, y + 13.5], TEXT_SIZE, &bar.total);
         let sizes = bar.parts.iter().map(|part| if part.is_finite() { part.max(0.0) } else { 0.0 });
         let sum: f64 = sizes.clone().sum();
         let mut x = left;
@@ -87,7 +81,7 @@ mod tests {
                 [&full, &legend].map(|picture| picture.pixels().filter(|p| **p == colour).count());
             (all - keys) as f64
         };
-        let length = SCALE * (BARS_WIDTH - 2.0 * TEXT_MARGIN - LABEL - TOTAL);
+        let length = SCALE * (BARS_WIDTH - 2.0 * INSET - LABEL - TOTAL);
         let bar = length * SCALE * BAR;
         assert!(((count(0) + count(2)) / bar - 1.0).abs() < 3e-3 && count(1) == 0.0);
         assert!((count(0) / bar - 0.75).abs() < 3e-3);

@@ -20,12 +20,12 @@ const SIZE: [f64; 2] = [350.0, 200.0];
 /// Pixels per unit in a picture.
 const SCALE: f64 = 1.6;
 /// Space around the axes.
-const AXES_LEFT: f64 = 46.0;
-const AXES_RIGHT: f64 = 14.0;
-const AXES_TOP: f64 = 26.0;
-const AXES_BOTTOM: f64 = 22.0;
+const LEFT: f64 = 46.0;
+const RIGHT: f64 = 14.0;
+const TOP: f64 = 26.0;
+const BOTTOM: f64 = 22.0;
 /// Space between the edge and text.
-const TEXT_MARGIN: f64 = 8.0;
+const INSET: f64 = 8.0;
 /// Space for the title of an axis.
 const AXIS_TITLE: f64 = 13.0;
 /// Font sizes, and the height of a line.
@@ -56,31 +56,21 @@ pub struct Chart {
 
 impl Chart {
     fn new(title: &str, unit: &str, axes: [ChartAxis; 2], legend: Vec<LegendKey>) -> Self {
-        let top = AXES_TOP + legend_height(&legend, SIZE[0]);
+        let top = TOP + legend_height(&legend, SIZE[0]);
         let [title, unit] = [title, unit].map(str::to_owned);
         let (latest, axis_titles, marks) = (String::new(), [const { String::new() }; 2], String::new());
-        Self {
-            title,
-            unit,
-            latest,
-            axes,
-            axis_titles,
-            legend,
-            top,
-            origin: [AXES_LEFT, SIZE[1] - AXES_BOTTOM],
-            marks,
-        }
+        Self { title, unit, latest, axes, axis_titles, legend, top, origin: [LEFT, SIZE[1] - BOTTOM], marks }
     }
 
     /// The same with titles of the axes, before anything is drawn.
     fn with_axis_titles(self, titles: [&str; 2]) -> Self {
-        let origin = [AXES_LEFT + AXIS_TITLE, SIZE[1] - AXES_BOTTOM - AXIS_TITLE];
+        let origin = [LEFT + AXIS_TITLE, SIZE[1] - BOTTOM - AXIS_TITLE];
         Self { axis_titles: titles.map(str::to_owned), origin, ..self }
     }
 
     /// Where a point stands; one outside the axes stands at their ends.
     fn place(&self, (x, y): (f64, f64)) -> [f64; 2] {
-        let (right, [left, bottom]) = (SIZE[0] - AXES_RIGHT, self.origin);
+        let (right, [left, bottom]) = (SIZE[0] - RIGHT, self.origin);
         let [x, y] = [self.axes[0].share(x), self.axes[1].share(y)];
         [left + x * (right - left), bottom - y * (bottom - self.top)]
     }
@@ -111,7 +101,7 @@ impl Chart {
 
     fn elements(&self) -> String {
         let mut svg = String::new();
-        let (right, [left, bottom]) = (SIZE[0] - AXES_RIGHT, self.origin);
+        let (right, [left, bottom]) = (SIZE[0] - RIGHT, self.origin);
         let [x, y] = &self.axes;
         for tick in y.ticks(TICKS) {
             let at = bottom - y.share(tick) * (bottom - self.top);
@@ -130,7 +120,7 @@ impl Chart {
             write_text(&mut svg, "x", [middle[0], SIZE[1] - 6.0], TEXT_SIZE, below);
         }
         if !beside.is_empty() {
-            let _ = write!(svg, r#"<g transform="translate({TEXT_MARGIN} {:.1}) rotate(-90)">"#, middle[1]);
+            let _ = write!(svg, r#"<g transform="translate({INSET} {:.1}) rotate(-90)">"#, middle[1]);
             write_text(&mut svg, "x", [0.0, 6.0], TEXT_SIZE, beside);
             svg += "</g>";
         }
@@ -140,7 +130,7 @@ impl Chart {
             format!(r#"<tspan class="unit" dx="4" font-size="{TEXT_SIZE}">{}</tspan>"#, escape(&unit));
         let _ = write!(
             svg,
-            r#"<text class="title" x="{TEXT_MARGIN}" y="16" font-size="{TITLE_SIZE}">{}{after}</text>"#,
+            r#"<text class="title" x="{INSET}" y="16" font-size="{TITLE_SIZE}">{}{after}</text>"#,
             escape(&self.title)
         );
         let _ = write!(
@@ -148,7 +138,7 @@ impl Chart {
             r#"<text class="latest" x="{right}" y="16" font-size="{TEXT_SIZE}">{}</text>"#,
             self.latest
         );
-        svg + &legend(&self.legend, [TEXT_MARGIN, AXES_TOP], SIZE[0])
+        svg + &legend(&self.legend, [INSET, TOP], SIZE[0])
     }
 }
 
@@ -189,7 +179,7 @@ fn legend_places(keys: &[LegendKey], width: f64) -> Vec<[f64; 2]> {
     keys.iter()
         .map(|key| {
             let own = LegendKey::SWATCH[0] + 5.0 + text_width(&key.name, TEXT_SIZE);
-            if x > 0.0 && x + own > width - 2.0 * TEXT_MARGIN {
+            if x > 0.0 && x + own > width - 2.0 * INSET {
                 [x, y] = [0.0, y + LINE_HEIGHT];
             }
             x += own + 14.0;
@@ -266,9 +256,9 @@ impl ChartGrid {
     fn elements(&self) -> String {
         let [width, _] = self.size();
         let mut svg = String::new();
-        let title = fitted(&self.title, width - 2.0 * TEXT_MARGIN, 14.0);
-        write_text(&mut svg, "title", [TEXT_MARGIN, 19.0], 14.0, &title);
-        svg += &legend(&self.legend, [TEXT_MARGIN, 28.0], width);
+        let title = fitted(&self.title, width - 2.0 * INSET, 14.0);
+        write_text(&mut svg, "title", [INSET, 19.0], 14.0, &title);
+        svg += &legend(&self.legend, [INSET, 28.0], width);
         for (index, chart) in self.charts.iter().enumerate() {
             let x = SIZE[0] * (index % self.columns()) as f64;
             let y = self.header() + SIZE[1] * (index / self.columns()) as f64;

@@ -40,41 +40,31 @@ impl fmt::Display for AdapterKind {
     }
 }
 
-/// An adapter of a list.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Adapter {
-    /// What chooses it, such as `wgpu:0`.
-    pub(super) choice: String,
-    /// What its driver calls it.
-    pub(super) name: String,
-    /// What it is.
-    pub(super) kind: AdapterKind,
-}
-
-impl fmt::Display for Adapter {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "--device {}: {} ({})", self.choice, self.name, self.kind)
-    }
-}
-
-/// The number of the adapter that is asked for, of `count`; `listed` describes them where there is none of that number.
+/// The adapter that is asked for by its number among `kinds`, or the first, as `open` opens it. `name` is what an open one is
+/// called.
 ///
 /// # Errors
-/// When there is no adapter, or none of that number.
-pub(super) fn numbered(
+/// When there is no adapter, or none of that number, which lists those that are there; and those of `open`.
+pub(super) fn open_numbered<D>(
     backend: &str,
     index: Option<usize>,
-    count: usize,
+    kinds: &[AdapterKind],
     hint: &'static str,
-    listed: impl FnOnce() -> Vec<Adapter>,
-) -> Result<usize, DeviceError> {
+    open: impl Fn(usize) -> Result<D, DeviceError>,
+    name: impl Fn(&D) -> String,
+) -> Result<D, DeviceError> {
     let device = index.map_or_else(|| backend.to_owned(), |index| format!("{backend}:{index}"));
     match index.unwrap_or(0) {
-        _ if count == 0 => Err(DeviceError::NoAdapter { device, hint }),
-        index if index < count => Ok(index),
+        _ if kinds.is_empty() => Err(DeviceError::NoAdapter { device, hint }),
+        index if index < kinds.len() => open(index),
         _ => {
-            let list = listed().iter().map(|adapter| format!("\n{adapter}")).collect();
-            Err(DeviceError::NoSuchAdapter { device, list })
+            let line = |(index, kind): (usize, &AdapterKind)| {
+                let name = open(index).map_or_else(|error| error.to_string(), |opened| name(&opened));
+                // Without the number and the API at its end.
+                let name = name.split(&format!(" ({backend}:")).next().unwrap_or_default();
+                format!("\n--device {backend}:{index}: {name} ({kind})")
+            };
+            Err(DeviceError::NoSuchAdapter { device, list: kinds.iter().enumerate().map(line).collect() })
         }
     }
 }
@@ -84,20 +74,19 @@ mod tests {
     use super::*;
     use miette::Report;
 
-    fn two() -> Vec<Adapter> {
-        let adapter =
-            |choice: &str, name: &str, kind| Adapter { choice: choice.into(), name: name.into(), kind };
-        vec![
-            adapter("wgpu:0", "NVIDIA H100 80GB HBM3", AdapterKind::Discrete),
-            adapter("wgpu:1", "llvmpipe", AdapterKind::Software),
-        ]
+    const TWO: [AdapterKind; 2] = [AdapterKind::Discrete, AdapterKind::Software];
+
+    fn numbered(index: Option<usize>, kinds: &[AdapterKind]) -> Result<&'static str, DeviceError> {
+        let names = ["NVIDIA H100 80GB HBM3 (wgpu:0, Vulkan)", "llvmpipe (wgpu:1, Vulkan)"];
+        let name = |name: &&str| (*name).to_owned();
+        open_numbered("wgpu", index, kinds, "install a driver", |index| Ok(names[index]), name)
     }
 
     #[test]
     fn device_number_beyond_the_last_adapter_lists_them_with_name_and_kind() {
-        assert_eq!(numbered("wgpu", None, 2, "", two).unwrap(), 0);
-        assert_eq!(numbered("wgpu", Some(1), 2, "", two).unwrap(), 1);
-        let report = Report::from(numbered("wgpu", Some(2), 2, "", two).unwrap_err());
+        assert!(numbered(None, &TWO).unwrap().starts_with("NVIDIA"));
+        assert!(numbered(Some(1), &TWO).unwrap().starts_with("llvmpipe"));
+        let report = Report::from(numbered(Some(2), &TWO).unwrap_err());
         assert_eq!(report.to_string(), "--device wgpu:2: there is no adapter of that number");
         assert_eq!(
             report.help().unwrap().to_string(),
@@ -108,7 +97,7 @@ mod tests {
 
     #[test]
     fn device_of_a_machine_without_adapters_is_an_error_that_says_what_to_install() {
-        let report = Report::from(numbered("wgpu", None, 0, "install a driver", Vec::new).unwrap_err());
+        let report = Report::from(numbered(None, &[]).unwrap_err());
         assert_eq!(report.to_string(), "--device wgpu: no adapter was found");
         assert_eq!(report.help().unwrap().to_string(), "install a driver");
     }

@@ -1,7 +1,7 @@
 //! NVIDIA's GPUs, as CUDA numbers them.
 
-use super::adapter::{Adapter, AdapterKind, numbered};
-use super::{DeviceError, Opened, opened_name, remember};
+use super::adapter::{AdapterKind, open_numbered};
+use super::{DeviceError, Opened, name, opened_name, remember};
 use burn::tensor::{Device, DeviceType};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -13,16 +13,16 @@ const CUDA_HINT: &str =
 /// # Errors
 /// When there is none, or it cannot be opened.
 pub(super) fn open(index: Option<usize>) -> Result<Device, DeviceError> {
-    let count = Device::enumerate(DeviceType::Cuda).len();
-    open_numbered(numbered("cuda", index, count, CUDA_HINT, || listed(count))?)
+    let kinds = vec![AdapterKind::Discrete; Device::enumerate(DeviceType::Cuda).len()];
+    open_numbered("cuda", index, &kinds, CUDA_HINT, open_gpu, name)
 }
 
 /// The first GPU if there is one, for `--device auto`.
 pub(super) fn open_hardware() -> Option<Result<Device, DeviceError>> {
-    (!Device::enumerate(DeviceType::Cuda).is_empty()).then(|| open_numbered(0))
+    (!Device::enumerate(DeviceType::Cuda).is_empty()).then(|| open_gpu(0))
 }
 
-fn open_numbered(index: usize) -> Result<Device, DeviceError> {
+fn open_gpu(index: usize) -> Result<Device, DeviceError> {
     let device = Device::cuda(index);
     if opened_name(&device).is_some() {
         return Ok(device);
@@ -35,15 +35,4 @@ fn open_numbered(index: usize) -> Result<Device, DeviceError> {
     let name = format!("{name} (cuda:{index})");
     remember(Opened { device: device.clone(), name, largest_buffer: None });
     Ok(device)
-}
-
-/// The GPUs with their names, which only an open one tells.
-fn listed(count: usize) -> Vec<Adapter> {
-    let adapter = |index| {
-        let opened = open_numbered(index).map(|device| opened_name(&device).unwrap_or_default());
-        let name = opened.unwrap_or_else(|error| error.to_string());
-        let name = name.split(" (cuda:").next().unwrap_or_default().to_owned();
-        Adapter { choice: format!("cuda:{index}"), name, kind: AdapterKind::Discrete }
-    };
-    (0..count).map(adapter).collect()
 }

@@ -1,7 +1,7 @@
 //! The adapters of WebGPU, all of the one graphics API that burn settles on: on Linux Vulkan where it has any.
 
-use super::adapter::{Adapter, AdapterKind, numbered};
-use super::{DeviceError, Opened, opened_name, remember};
+use super::adapter::{AdapterKind, open_numbered};
+use super::{DeviceError, Opened, name, opened_name, remember};
 use burn::tensor::wgpu::WgpuInitError;
 use burn::tensor::{Device, DeviceKind, DeviceType};
 
@@ -39,8 +39,9 @@ fn selectors() -> Vec<Selector> {
 /// When there is none, or it cannot be opened.
 pub(super) fn open(index: Option<usize>) -> Result<Device, DeviceError> {
     let selectors = selectors();
-    let index = numbered("wgpu", index, selectors.len(), WGPU_HINT, || listed(&selectors))?;
-    open_selected(index, &selectors[index].1)
+    let kinds: Vec<AdapterKind> = selectors.iter().map(|(kind, _)| *kind).collect();
+    let open = |index: usize| open_selected(index, &selectors[index].1);
+    open_numbered("wgpu", index, &kinds, WGPU_HINT, open, name)
 }
 
 /// The first adapter if it is a GPU, for `--device auto`.
@@ -85,16 +86,4 @@ fn open_selected(index: usize, selector: &DeviceKind) -> Result<Device, DeviceEr
     };
     remember(Opened { device: device.clone(), name, largest_buffer });
     Ok(device)
-}
-
-/// The adapters with their names, which only an open one tells.
-fn listed(selectors: &[Selector]) -> Vec<Adapter> {
-    let adapter = |(index, (kind, selector)): (usize, &Selector)| {
-        let opened = open_selected(index, selector);
-        let name = opened.map(|device| opened_name(&device).unwrap_or_default());
-        let name = name.unwrap_or_else(|error| error.to_string());
-        let name = name.split(" (wgpu:").next().unwrap_or_default().to_owned();
-        Adapter { choice: format!("wgpu:{index}"), name, kind: *kind }
-    };
-    selectors.iter().enumerate().map(adapter).collect()
 }
