@@ -1,9 +1,10 @@
 //! `--device`, the same for every verb that runs networks.
 
 use crate::cli::verbosity::print_status;
-use crate::system::device::{DeviceChoice, DeviceError, HAS_GPU_BACKEND, name};
+use crate::system::device::{DeviceChoice, HAS_GPU_BACKEND, name};
 use burn::tensor::Device;
 use clap::Args;
+use miette::Report;
 
 /// Where networks run.
 #[derive(Args, Clone, Copy, Debug)]
@@ -19,7 +20,7 @@ impl DeviceArgument {
     ///
     /// # Errors
     /// When this build or machine has none such.
-    pub(crate) fn open(self) -> Result<Device, DeviceError> {
+    pub(crate) fn open(self) -> Result<Device, Report> {
         let device = self.choice.open()?;
         let line = format!("device: {}", name(&device));
         match (self.choice, HAS_GPU_BACKEND) {

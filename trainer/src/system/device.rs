@@ -9,14 +9,13 @@ mod adapter;
 mod choice;
 #[cfg(feature = "cuda")]
 mod cuda;
-mod error;
 #[cfg(feature = "wgpu")]
 mod wgpu;
 
 pub use choice::DeviceChoice;
-pub use error::DeviceError;
 
 use burn::tensor::Device;
+use miette::{Report, miette};
 use std::sync::Mutex;
 
 /// Whether this build can use a GPU at all.
@@ -112,10 +111,16 @@ fn remember(opened: Opened) {
 ///
 /// # Errors
 /// When it does.
-pub fn check_largest(device: &Device, bytes: u64) -> Result<(), DeviceError> {
+pub fn check_largest(device: &Device, bytes: u64) -> Result<(), Report> {
     let device = device.clone().inner();
     match opened(&device, |opened| opened.largest_buffer).flatten() {
-        Some(limit) if bytes > limit => Err(DeviceError::TooLarge { device: name(&device), bytes, limit }),
+        Some(limit) if bytes > limit => Err(miette!(
+            help = "fewer garments per outfit (layers) or vertices, a smaller model.siren_width, or --device flex",
+            "the largest outfit needs a tensor of {} MiB, and {} grants {} MiB at once",
+            bytes.div_ceil(1 << 20),
+            name(&device),
+            limit >> 20
+        )),
         _ => Ok(()),
     }
 }

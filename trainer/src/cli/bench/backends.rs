@@ -5,7 +5,7 @@ use crate::cli::output::print_report;
 use crate::cli::table::{markdown, row};
 use crate::cli::values::{measuring_seconds, not_negative};
 use crate::cli::verbosity::print_status;
-use crate::system::device::{DeviceChoice, DeviceError};
+use crate::system::device::DeviceChoice;
 use crate::training::measure::{BenchmarkRun, Case, NETWORKS};
 use burn::tensor::Device;
 use clap::Parser;
@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let others = wanted.iter().copied().filter(|choice| *choice != all[0]);
     // All before the first is measured: one that is not there is known at once.
     let opened = [all[0]].into_iter().chain(others).map(|choice| Ok((choice, choice.open()?)));
-    let devices = opened.collect::<Result<Vec<_>, DeviceError>>()?;
+    let devices = opened.collect::<Result<Vec<_>, Report>>()?;
     let config = Case::new(arguments.width, arguments.layers, arguments.vertices).config(&[])?;
     let dataset = load_dataset(&config)?;
     let run_on = |device: &Device| BenchmarkRun::new(config.clone(), dataset.clone(), 0, device);

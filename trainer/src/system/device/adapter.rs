@@ -1,7 +1,7 @@
 //! GPUs, and programs that stand for one, as a machine offers them.
 
-use super::DeviceError;
-use std::fmt;
+use miette::{Report, miette};
+use std::fmt::{self, Display};
 
 /// What an adapter is, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,12 +50,12 @@ pub(super) fn open_numbered<D>(
     index: Option<usize>,
     kinds: &[AdapterKind],
     hint: &'static str,
-    open: impl Fn(usize) -> Result<D, DeviceError>,
+    open: impl Fn(usize) -> Result<D, Report>,
     name: impl Fn(&D) -> String,
-) -> Result<D, DeviceError> {
+) -> Result<D, Report> {
     let device = index.map_or_else(|| backend.to_owned(), |index| format!("{backend}:{index}"));
     match index.unwrap_or(0) {
-        _ if kinds.is_empty() => Err(DeviceError::NoAdapter { device, hint }),
+        _ if kinds.is_empty() => Err(miette!(help = hint, "--device {device}: no adapter was found")),
         index if index < kinds.len() => open(index),
         _ => {
             let line = |(index, kind): (usize, &AdapterKind)| {
@@ -64,19 +64,31 @@ pub(super) fn open_numbered<D>(
                 let name = name.split(&format!(" ({backend}:")).next().unwrap_or_default();
                 format!("\n--device {backend}:{index}: {name} ({kind})")
             };
-            Err(DeviceError::NoSuchAdapter { device, list: kinds.iter().enumerate().map(line).collect() })
+            let list: String = kinds.iter().enumerate().map(line).collect();
+            Err(miette!(
+                help = format!("found here:{list}"),
+                "--device {device}: there is no adapter of that number"
+            ))
         }
     }
+}
+
+/// An adapter that is there but does not work.
+#[cfg_attr(not(any(feature = "wgpu", feature = "cuda")), allow(dead_code))]
+pub(super) fn cannot_open(backend: &str, index: usize, reason: impl Display) -> Report {
+    miette!(
+        help = "check its driver; `--device flex` computes on the processor",
+        "--device {backend}:{index} cannot be opened: {reason}"
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use miette::Report;
 
     const TWO: [AdapterKind; 2] = [AdapterKind::Discrete, AdapterKind::Software];
 
-    fn numbered(index: Option<usize>, kinds: &[AdapterKind]) -> Result<&'static str, DeviceError> {
+    fn numbered(index: Option<usize>, kinds: &[AdapterKind]) -> Result<&'static str, Report> {
         let names = ["NVIDIA H100 80GB HBM3 (wgpu:0, Vulkan)", "llvmpipe (wgpu:1, Vulkan)"];
         let name = |name: &&str| (*name).to_owned();
         open_numbered("wgpu", index, kinds, "install a driver", |index| Ok(names[index]), name)
@@ -86,7 +98,7 @@ mod tests {
     fn device_number_beyond_the_last_adapter_lists_them_with_name_and_kind() {
         assert!(numbered(None, &TWO).unwrap().starts_with("NVIDIA"));
         assert!(numbered(Some(1), &TWO).unwrap().starts_with("llvmpipe"));
-        let report = Report::from(numbered(Some(2), &TWO).unwrap_err());
+        let report = numbered(Some(2), &TWO).unwrap_err();
         assert_eq!(report.to_string(), "--device wgpu:2: there is no adapter of that number");
         assert_eq!(
             report.help().unwrap().to_string(),
@@ -97,7 +109,7 @@ mod tests {
 
     #[test]
     fn device_of_a_machine_without_adapters_is_an_error_that_says_what_to_install() {
-        let report = Report::from(numbered(None, &[]).unwrap_err());
+        let report = numbered(None, &[]).unwrap_err();
         assert_eq!(report.to_string(), "--device wgpu: no adapter was found");
         assert_eq!(report.help().unwrap().to_string(), "install a driver");
     }

@@ -1,7 +1,8 @@
 //! What `--device` may say, and the device that it means on this machine.
 
-use super::{DeviceError, default_device};
+use super::default_device;
 use burn::tensor::Device;
+use miette::{Report, miette};
 use std::fmt;
 use std::str::FromStr;
 
@@ -54,7 +55,7 @@ impl DeviceChoice {
     ///
     /// # Errors
     /// When this build lacks the backend, or the machine the device, or the device cannot be opened.
-    pub fn open(self) -> Result<Device, DeviceError> {
+    pub fn open(self) -> Result<Device, Report> {
         match self {
             Self::Auto => open_best(),
             #[cfg(feature = "flex")]
@@ -66,16 +67,19 @@ impl DeviceChoice {
             #[cfg(feature = "cuda")]
             Self::Cuda(index) => super::cuda::open(index),
             #[allow(unreachable_patterns)] // where all backends are compiled in
-            _ => Err(DeviceError::NotInThisBuild {
-                device: self.to_string(),
-                feature: self.feature().unwrap_or_default(),
-            }),
+            _ => {
+                let feature = self.feature().unwrap_or_default();
+                Err(miette!(
+                    help = format!("build it: cargo build --release --workspace --bins --features {feature}"),
+                    "--device {self}: this build has no Cargo feature `{feature}`"
+                ))
+            }
         }
     }
 }
 
 /// The first GPU that opens, else the processor; in a build without that, whatever adapter there is.
-fn open_best() -> Result<Device, DeviceError> {
+fn open_best() -> Result<Device, Report> {
     #[cfg(feature = "cuda")]
     if let Some(device) = or_warn(super::cuda::open_hardware()) {
         return Ok(device);
@@ -92,7 +96,7 @@ fn open_best() -> Result<Device, DeviceError> {
 
 /// The device, or none with a warning where a GPU that is there does not open.
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
-fn or_warn(opened: Option<Result<Device, DeviceError>>) -> Option<Device> {
+fn or_warn(opened: Option<Result<Device, Report>>) -> Option<Device> {
     opened?.map_err(|error| tracing::warn!("passed over: {error}")).ok()
 }
 
@@ -177,7 +181,7 @@ mod tests {
             if choice.is_in_this_build() {
                 continue;
             }
-            let report = miette::Report::from(choice.open().unwrap_err());
+            let report = choice.open().unwrap_err();
             let feature = choice.feature().unwrap();
             let said = format!("{report} {}", report.help().unwrap());
             assert!(said.contains(&format!("--device {choice}")) && said.contains("Cargo feature"), "{said}");
@@ -211,7 +215,7 @@ mod tests {
         assert!(!is_processor(&device));
         assert!(name(&device).contains("(wgpu:0, "), "{}", name(&device));
         assert!(DeviceChoice::Wgpu(Some(0)).open().unwrap() == device);
-        let report = miette::Report::from(DeviceChoice::Wgpu(Some(99)).open().unwrap_err());
+        let report = DeviceChoice::Wgpu(Some(99)).open().unwrap_err();
         let said = format!("{report} {}", report.help().unwrap());
         assert!(said.contains("--device wgpu:99") && said.contains("wgpu:0"), "{said}");
     }

@@ -1,9 +1,10 @@
 //! The adapters of WebGPU, all of the one graphics API that burn settles on: on Linux Vulkan where it has any.
 
-use super::adapter::{AdapterKind, open_numbered};
-use super::{DeviceError, Opened, name, opened_name, remember};
+use super::adapter::{AdapterKind, cannot_open, open_numbered};
+use super::{Opened, name, opened_name, remember};
 use burn::tensor::wgpu::WgpuInitError;
 use burn::tensor::{Device, DeviceKind, DeviceType};
+use miette::Report;
 
 const WGPU_HINT: &str = "install the GPU's Vulkan driver and the Vulkan loader (Debian: libvulkan1; mesa-vulkan-drivers for AMD and \
      Intel GPUs and for an adapter in software), or compute on the processor with --device flex";
@@ -37,7 +38,7 @@ fn selectors() -> Vec<Selector> {
 ///
 /// # Errors
 /// When there is none, or it cannot be opened.
-pub(super) fn open(index: Option<usize>) -> Result<Device, DeviceError> {
+pub(super) fn open(index: Option<usize>) -> Result<Device, Report> {
     let selectors = selectors();
     let kinds: Vec<AdapterKind> = selectors.iter().map(|(kind, _)| *kind).collect();
     let open = |index: usize| open_selected(index, &selectors[index].1);
@@ -45,13 +46,13 @@ pub(super) fn open(index: Option<usize>) -> Result<Device, DeviceError> {
 }
 
 /// The first adapter if it is a GPU, for `--device auto`.
-pub(super) fn open_hardware() -> Option<Result<Device, DeviceError>> {
+pub(super) fn open_hardware() -> Option<Result<Device, Report>> {
     let selectors = selectors();
     let (kind, selector) = selectors.first()?;
     kind.is_hardware().then(|| open_selected(0, selector))
 }
 
-fn open_selected(index: usize, selector: &DeviceKind) -> Result<Device, DeviceError> {
+fn open_selected(index: usize, selector: &DeviceKind) -> Result<Device, Report> {
     let device = Device::wgpu(selector.clone());
     if opened_name(&device).is_some() {
         return Ok(device);
@@ -63,10 +64,8 @@ fn open_selected(index: usize, selector: &DeviceKind) -> Result<Device, DeviceEr
             let api = format!("{:?}", adapter.backend);
             // What burn falls back to without a driver of the other APIs: slow, and never tried.
             if api == "Gl" {
-                return Err(DeviceError::CannotOpen {
-                    device: format!("wgpu:{index}"),
-                    reason: format!("{} is there through OpenGL only; {WGPU_HINT}", adapter.name),
-                });
+                let reason = format!("{} is there through OpenGL only; {WGPU_HINT}", adapter.name);
+                return Err(cannot_open("wgpu", index, reason));
             }
             let limits = setup.device.limits();
             let largest = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
@@ -77,12 +76,7 @@ fn open_selected(index: usize, selector: &DeviceKind) -> Result<Device, DeviceEr
             let identity = device.identity().map(|identity| identity.name);
             (format!("{} (wgpu:{index})", identity.unwrap_or_default()), None)
         }
-        Err(error) => {
-            return Err(DeviceError::CannotOpen {
-                device: format!("wgpu:{index}"),
-                reason: error.to_string(),
-            });
-        }
+        Err(error) => return Err(cannot_open("wgpu", index, error)),
     };
     remember(Opened { device: device.clone(), name, largest_buffer });
     Ok(device)
