@@ -211,7 +211,7 @@ impl TrainedModel {
         self.networks(device)
     }
 
-    /// Whether a run of `config` could start from these networks, as far as its [model] section tells.
+    /// Whether a run of `config` could start from these networks, as far as its `[model]` section tells.
     ///
     /// # Errors
     /// Names the keys that differ.
