@@ -7,6 +7,8 @@ use miette::{IntoDiagnostic, Report};
 use serde_json::Value;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::PathBuf;
 use std::rc::Rc;
 
@@ -50,11 +52,11 @@ impl History {
     /// What the logs of `run` hold.
     ///
     /// # Errors
-    /// When a log exists but cannot be read.
+    /// When a log exists but cannot be opened.
     pub fn read(run: &RunDir) -> Result<Self, Report> {
         let mut history = Self::default();
-        lines(run.metrics())?.iter().for_each(|line| history.note_step(line));
-        lines(run.validation())?.into_iter().for_each(|line| history.note_validation(line));
+        lines(run.metrics())?.for_each(|line| history.note_step(&line));
+        lines(run.validation())?.for_each(|line| history.note_validation(line));
         let pictures = std::fs::read_dir(run.samples()).into_iter().flatten().flatten().map(|e| e.path());
         history.samples = pictures.filter(|p| p.extension().is_some_and(|e| e == "png")).collect();
         history.samples.sort();
@@ -104,15 +106,15 @@ impl History {
     }
 }
 
-/// The lines of a log that are whole; none where it is not there.
-fn lines(path: PathBuf) -> Result<Vec<Value>, Report> {
-    match std::fs::read(path) {
-        Ok(text) => {
-            Ok(text.split(|byte| *byte == b'\n').filter_map(|l| serde_json::from_slice(l).ok()).collect())
-        }
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-        Err(e) => Err(e).into_diagnostic(),
-    }
+/// The lines of a log that are whole, one after the other; none where it is not there.
+fn lines(path: PathBuf) -> Result<impl Iterator<Item = Value>, Report> {
+    let file = match File::open(path) {
+        Ok(file) => Some(BufReader::new(file)),
+        Err(e) if e.kind() == ErrorKind::NotFound => None,
+        Err(e) => return Err(e).into_diagnostic(),
+    };
+    let lines = file.into_iter().flat_map(|file| file.split(b'\n').map_while(Result::ok));
+    Ok(lines.filter_map(|line| serde_json::from_slice(&line).ok()))
 }
 
 /// Keeps a [`History`] up to date; it comes before the observers that look at it.
