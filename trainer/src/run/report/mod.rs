@@ -121,15 +121,15 @@ impl RunPage<'_> {
     }
 
     fn header(&self) -> String {
+        let facts = self.facts;
         let step = self.history.last.as_ref().map_or(0, |(step, _)| *step);
         let stage = self.history.last.as_ref().map_or("", |(_, stage)| stage.as_str());
-        let percent = 100.0 * step as f64 / self.facts.steps.total.max(1) as f64;
-        let mut tiles =
-            vec![("step", format!("{step} of {}", self.facts.steps.total)), ("stage", escape(stage))];
+        let percent = 100.0 * step as f64 / facts.steps.total.max(1) as f64;
+        let mut tiles = vec![("step", format!("{step} of {}", facts.steps.total)), ("stage", escape(stage))];
         if let Some(speed) = self.speed.filter(|s| *s > 0.0) {
             tiles.push(("speed", format!("{} steps/s", number_text(speed, 3))));
             if self.state == RunState::Running {
-                let left = (self.facts.steps.total.saturating_sub(step)) as f64 / speed;
+                let left = (facts.steps.total.saturating_sub(step)) as f64 / speed;
                 tiles.push(("time left", duration(left)));
             }
         }
@@ -139,18 +139,15 @@ impl RunPage<'_> {
         if let Some((step, score)) = self.history.best {
             tiles.push(("best validation", format!("{} at step {step}", number_text(score, 4))));
         }
-        tiles.push(("device", escape(&self.facts.device)));
+        tiles.push(("device", escape(&facts.device)));
         tiles.push(("skipped steps", self.history.skipped.len().to_string()));
         tiles.push(("gradient spikes", self.history.spikes.len().to_string()));
-        if self.facts.warned_files > 0 {
-            tiles.push(("data", format!("warnings about {} files", self.facts.warned_files)));
+        if facts.warned_files > 0 {
+            tiles.push(("data", format!("warnings about {} files", facts.warned_files)));
         }
         if let Some(peak) = self.peak {
-            let estimated = self
-                .facts
-                .memory
-                .map(|m| format!(" (estimated {})", gibibytes(m.peak())))
-                .unwrap_or_default();
+            let estimated =
+                facts.memory.map(|m| format!(" (estimated {})", gibibytes(m.peak()))).unwrap_or_default();
             tiles.push(("peak memory", format!("{}{estimated}", gibibytes(peak))));
         }
         let tiles: String = tiles
@@ -160,7 +157,7 @@ impl RunPage<'_> {
         format!(
             "<header><h1>{} <span class=\"state {}\">{}</span></h1><p>as of {}</p>\
                 <div class=\"bar\"><i style=\"width:{percent:.1}%\"></i></div><div class=\"tiles\">{tiles}</div></header>\n",
-            escape(&self.facts.name),
+            escape(&facts.name),
             self.state.name().replace(' ', "-"),
             self.state.name(),
             utc(self.made)
