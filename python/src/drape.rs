@@ -5,8 +5,8 @@ use crate::call::{call, refused_text};
 use clothcombo_physics::contact::resolve::Certificate;
 use clothcombo_trainer::inference::output::{Show, Staged, write};
 use clothcombo_trainer::inference::{
-    Bodies, Drape as FrameDrape, Draper, GarmentDrape, Outfit, OutfitGarment, Report as DrapeReport,
-    ScoredPositions, Smoothing,
+    Bodies, Drape as FrameDrape, DrapeReport, Draper, GarmentDrape, Outfit, OutfitGarment, ScoredPositions,
+    Smoothing,
 };
 use miette::Report;
 use numpy::{PyArray2, PyArray3};
@@ -140,7 +140,7 @@ impl Drape {
             let smoothing = smoothing.as_ref();
             let show = Show { draper, outfit, bodies, drapes, smoothing, title: &title, all_frames };
             write(staged.folder(), &show)?;
-            Ok::<_, Report>(staged.commit()?)
+            staged.commit()
         })
     }
 }

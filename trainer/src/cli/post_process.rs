@@ -24,13 +24,16 @@ impl PostProcessArguments {
     }
 }
 
-/// Says that the budget ended the post-process, if it did.
-pub fn stopped(certificate: &Certificate) -> Option<String> {
-    certificate.is_stopped.then(|| {
-        format!(
-            "stopped after its budget, {} pairs left; hint: a longer --time-limit if there is one, another order of the garments, \
-             fewer of them, or a pose in which the body overlaps itself less",
-            certificate.between()
-        )
-    })
+/// What is left and what to do about it, if anything is left or the budget ended the post-process.
+pub fn left_over(certificate: &Certificate) -> Option<String> {
+    let pairs = certificate.pairs();
+    let (stopped, longer) = match (certificate.is_stopped, pairs) {
+        (false, 0) => return None,
+        (false, _) => ("", ""),
+        (true, _) => ("stopped after its budget, ", "a longer --time-limit if there is one, "),
+    };
+    Some(format!(
+        "{stopped}{pairs} pairs left, listed in report.json; hint: {longer}another order of the garments, fewer of them, or a pose \
+         in which the body overlaps itself less"
+    ))
 }

@@ -1,15 +1,13 @@
 //! `clothcombo resolve`: anyone's garments taken out of anyone's body, and out of each other.
 
 use crate::cli::output::print_report;
-use crate::cli::post_process::{PostProcessArguments, stopped};
+use crate::cli::post_process::{PostProcessArguments, left_over};
 use crate::cli::table::{row, table};
 use crate::cli::verbosity::spinner;
 use crate::inference::UniqueNames;
 use crate::inference::output::Staged;
 use crate::picture::{DressedRow, draw_dressed, save_png};
-use crate::score::{
-    DrapedGarment, NamedMesh, Score, ScoreDistance, ScoreError, checked_body, checked_garment, score,
-};
+use crate::score::{DrapedGarment, NamedMesh, Score, ScoreDistance, checked_body, checked_garment, score};
 use crate::system::paths::lossy;
 use clap::Parser;
 use clothcombo_data::format::obj::MovedObj;
@@ -90,14 +88,14 @@ struct ResolvedGarment {
 }
 
 /// A garment as read.
-struct Garment {
+struct ReadGarment {
     path: PathBuf,
     name: String,
     rest: TriMesh,
     draped: TriMesh,
 }
 
-impl Garment {
+impl ReadGarment {
     fn file(&self) -> String {
         format!("{}.obj", self.name)
     }
@@ -141,7 +139,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             .zip(&all)
             .map(|(g, positions)| DrapedGarment { name: &g.name, rest: &g.rest, positions, canonical: None })
             .collect();
-        Ok(score(&body, &draped, ScoreDistance::Surface)?)
+        score(&body, &draped, ScoreDistance::Surface)
     };
     let ms = |time: Duration| 1e3 * time.as_secs_f64();
     let report = ResolveReport {
@@ -171,7 +169,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     print_report(arguments.json, &report, text)
 }
 
-fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<Garment>, Report> {
+fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<ReadGarment>, Report> {
     let (draped, rest) = (&arguments.garments, &arguments.rest);
     if !rest.is_empty() && rest.len() != draped.len() {
         return Err(miette!(
@@ -181,13 +179,13 @@ fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<Garment>, 
             draped.len()
         ));
     }
-    let mut garments: Vec<Garment> = Vec::with_capacity(draped.len());
+    let mut garments: Vec<ReadGarment> = Vec::with_capacity(draped.len());
     let mut names = UniqueNames::default();
     for (i, path) in draped.iter().enumerate() {
         let (rest, draped) = (NamedMesh::load(rest.get(i).unwrap_or(path))?, NamedMesh::load(path)?);
         let name = checked_garment(&rest, &draped, body)?;
         // Two files of one name from two folders must not overwrite each other.
-        garments.push(Garment {
+        garments.push(ReadGarment {
             path: path.clone(),
             name: names.take(&name),
             rest: rest.mesh,
@@ -201,7 +199,7 @@ fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<Garment>, 
 fn write(
     staged: Staged,
     body: &TriMesh,
-    garments: &[Garment],
+    garments: &[ReadGarment],
     resolved: &Resolved,
     report: &ResolveReport,
 ) -> Result<(), Report> {
@@ -215,7 +213,7 @@ fn write(
     }
     save_pictures(folder, body, garments, resolved)?;
     fs::write(folder.join("report.json"), json).into_diagnostic().wrap_err_with(|| failed("report.json"))?;
-    Ok(staged.commit()?)
+    staged.commit()
 }
 
 /// Writes `picture.png`, before and after one below the other, and `layers.png`, after, each garment alone, where there is more
@@ -223,7 +221,7 @@ fn write(
 fn save_pictures(
     folder: &Path,
     body: &TriMesh,
-    garments: &[Garment],
+    garments: &[ReadGarment],
     resolved: &Resolved,
 ) -> Result<(), Report> {
     let rows = [
@@ -244,7 +242,7 @@ fn save_pictures(
 fn row<'a>(
     label: &str,
     body: &'a TriMesh,
-    garments: &'a [Garment],
+    garments: &'a [ReadGarment],
     positions: impl Iterator<Item = &'a [[f64; 3]]>,
 ) -> DressedRow<'a> {
     DressedRow {
@@ -257,7 +255,7 @@ fn row<'a>(
 }
 
 /// The garment's file with new positions; a file of another format becomes an OBJ of its polygons.
-fn moved(garment: &Garment, positions: &[[f64; 3]]) -> Result<MovedObj, Report> {
+fn moved(garment: &ReadGarment, positions: &[[f64; 3]]) -> Result<MovedObj, Report> {
     let path = &garment.path;
     let bytes = fs::read(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
     if MeshFormat::detect(path, &bytes) == Some(MeshFormat::Obj) {
@@ -268,7 +266,7 @@ fn moved(garment: &Garment, positions: &[[f64; 3]]) -> Result<MovedObj, Report> 
     for [x, y, z] in positions {
         let _ = writeln!(text, "v {x} {y} {z}");
     }
-    for polygon in load_mesh(path).map_err(ScoreError::from)?.polygons() {
+    for polygon in load_mesh(path).into_diagnostic()?.polygons() {
         text.push('f');
         polygon.iter().for_each(|v| {
             let _ = write!(text, " {}", u64::from(*v) + 1);
@@ -303,6 +301,6 @@ fn text(report: &ResolveReport) -> String {
             "file" => garment.output.display().to_string(),
         }
     });
-    let stopped = stopped(&report.certificate).map_or_else(String::new, |text| format!("\n{text}\n"));
-    format!("{}\n{}{stopped}", table(&rows), table(&garments.collect::<Vec<_>>()))
+    let left = left_over(&report.certificate).map_or_else(String::new, |text| format!("\n{text}\n"));
+    format!("{}\n{}{left}", table(&rows), table(&garments.collect::<Vec<_>>()))
 }

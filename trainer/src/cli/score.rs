@@ -2,7 +2,7 @@
 
 use super::output::print_report;
 use super::table::{Row, row, table};
-use crate::score::{MeshFiles, Score, ScoreDistance, TermValues, score_files};
+use crate::score::{NamedMesh, SceneMeshes, Score, ScoreDistance, TermValues, score_meshes};
 use clap::Parser;
 use miette::Report;
 use std::path::PathBuf;
@@ -41,10 +41,17 @@ pub struct Arguments {
 /// # Errors
 /// When a file cannot be read, or meshes do not fit together.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let Arguments { body, rest, draped, canonical, .. } = arguments;
-    let files = MeshFiles { body, rest, draped, canonical };
+    let load = |paths: &[PathBuf]| -> Result<Vec<NamedMesh>, Report> {
+        paths.iter().map(|path| NamedMesh::load(path)).collect()
+    };
+    let meshes = SceneMeshes {
+        body: NamedMesh::load_body(&arguments.body)?,
+        rest: load(&arguments.rest)?,
+        draped: load(&arguments.draped)?,
+        canonical: load(&arguments.canonical)?,
+    };
     let distance = if arguments.surface { ScoreDistance::Surface } else { ScoreDistance::NearestVertex };
-    let score = score_files(&files, distance)?;
+    let score = score_meshes(meshes, distance)?;
     print_report(arguments.json, &score, tables)
 }
 

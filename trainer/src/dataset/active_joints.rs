@@ -14,7 +14,7 @@ pub struct ActiveJoints {
 }
 
 /// Below this weight on every vertex of every garment a joint is dropped; its nearest active ancestor takes the weight.
-const NEGLIGIBLE: f32 = 1e-3;
+const NEGLIGIBLE_WEIGHT: f32 = 1e-3;
 
 impl ActiveJoints {
     /// Collects the joints in use from the largest weight of every joint on each garment
@@ -25,7 +25,7 @@ impl ActiveJoints {
         for garment in garments {
             largest.iter_mut().zip(garment).for_each(|(l, w)| *l = l.max(*w));
         }
-        Self::of(body, (0..joints).filter(|&j| largest[j] > NEGLIGIBLE).collect())
+        Self::of(body, (0..joints).filter(|&j| largest[j] > NEGLIGIBLE_WEIGHT).collect())
     }
 
     /// The joints of these names, in this order: those that trained networks see.

@@ -33,7 +33,7 @@ pub(super) struct GarmentCache {
     arrays: ArrayCache,
     body: Key,
     /// Why something could not be stored; nothing more is stored then.
-    failure: OnceLock<String>,
+    failure: OnceLock<CacheError>,
 }
 
 impl Preprocessor {
@@ -80,20 +80,16 @@ impl Preprocessor {
     pub fn store(&self, put: impl FnOnce(&ArrayCache) -> Result<(), CacheError>) {
         let Some(cache) = self.cache.as_ref().filter(|cache| cache.failure.get().is_none()) else { return };
         if let Err(error) = put(&cache.arrays) {
-            let mut is_first = false;
-            cache.failure.get_or_init(|| {
-                is_first = true;
-                error.to_string()
-            });
-            if is_first {
-                tracing::warn!("{error}; nothing more is stored");
+            let warning = format!("{error}; nothing more is stored");
+            if cache.failure.set(error).is_ok() {
+                tracing::warn!("{warning}");
             }
         }
     }
 
     /// Why nothing more is stored, if so.
-    pub fn store_failure(&self) -> Option<&str> {
-        self.cache.as_ref()?.failure.get().map(String::as_str)
+    pub fn store_failure(&self) -> Option<&CacheError> {
+        self.cache.as_ref()?.failure.get()
     }
 
     /// The binding of a garment whose rest mesh has the key `mesh`: from the cache, or computed and stored there.
@@ -165,8 +161,8 @@ impl Preprocessor {
         rest: &TriMesh,
         mesh: Key,
     ) -> Result<SurfaceOperators, DatasetError> {
-        let operators = SurfaceOperators::new(rest, self.eigen_count)
-            .map_err(|e| DatasetError::Garment { name: name.to_owned(), reason: e.to_string() })?;
+        let operators =
+            SurfaceOperators::new(rest, self.eigen_count).map_err(|e| DatasetError::garment(name, e))?;
         self.store(|cache| put_operators(cache, operators_key(mesh, self.eigen_count), &operators));
         Ok(operators)
     }
@@ -190,7 +186,7 @@ impl Preprocessor {
         let material = garment.material.over(&self.energy.material);
         let settings = EnergySettings { material, ..self.energy };
         let energies = GarmentEnergies::new(&garment.rest, &topology, &settings, garment.holding)
-            .map_err(|e| DatasetError::Garment { name: garment.name.clone(), reason: e.to_string() })?;
+            .map_err(|e| DatasetError::garment(&garment.name, e))?;
         Ok(PreparedGarment {
             skin_weights: joints.restrict(&binding.skin_weights),
             shape_directions: binding.shape_directions,

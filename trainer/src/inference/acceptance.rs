@@ -9,7 +9,7 @@
 //!
 //! So no outfit ends above either skinning, and no garment above what it began with.
 
-use super::descent::{BACKTRACKING, Descent, WHOLE};
+use super::descent::{BACKTRACKING, Descent, WHOLE_STEP};
 use super::draped::{Draped, to_device};
 use super::layer_interaction::LayerInteraction;
 use super::on_body::OnBody;
@@ -40,7 +40,7 @@ fn take_networks(
     body: &BodyTensors,
 ) {
     let device = &skin_weights.device();
-    let shares = descent.advance(proposed, &WHOLE);
+    let shares = descent.advance(proposed, &WHOLE_STEP);
     let stayed = |garment: usize| shares[garment] == 0.0;
     if !(0..shares.len()).any(stayed) {
         return;

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 /// Backtracking: a step that goes too far along a direction that is right is halved, and halved again.
 pub const BACKTRACKING: [f32; 3] = [1.0, 0.5, 0.25];
 /// All of it or nothing, for a proposal that is a place rather than a direction.
-pub const WHOLE: [f32; 1] = [1.0];
+pub const WHOLE_STEP: [f32; 1] = [1.0];
 
 /// A state of an outfit whose energies only fall.
 pub struct Descent<'a> {
@@ -32,7 +32,7 @@ pub struct Descent<'a> {
 impl<'a> Descent<'a> {
     /// Starts from `state`.
     pub fn new(energy: &'a SceneEnergy<f32>, state: Draped) -> Self {
-        let Measured { energies, shares_of_total, total } = measured(energy, &state);
+        let StateEnergies { energies, shares_of_total, total } = measured(energy, &state);
         let mut group: Vec<usize> = (0..energies.len()).collect();
         for pair in &energy.layers {
             let [from, to] = [pair.inner, pair.outer].map(|garment| group[garment]);
@@ -53,7 +53,7 @@ impl<'a> Descent<'a> {
         let mut best = starts.remove(lowest.expect("a state to start from"));
         for other in starts {
             let gains: Vec<bool> = other.energies.iter().zip(&best.energies).map(|(o, b)| o < b).collect();
-            best.advance_some(&other.state, &WHOLE, |garment| gains[garment]);
+            best.advance_some(&other.state, &WHOLE_STEP, |garment| gains[garment]);
         }
         best
     }
@@ -103,7 +103,7 @@ impl<'a> Descent<'a> {
         let share = |taken: usize| shares.get(taken).copied().unwrap_or(0.0);
         while taken.iter().any(|s| *s < shares.len()) {
             let trial = self.between(proposal, |i| share(taken[i]));
-            let Measured { energies, shares_of_total, total } = measured(self.energy, &trial);
+            let StateEnergies { energies, shares_of_total, total } = measured(self.energy, &trial);
             let moves = |i: usize| taken[i] < shares.len();
             let rose = (0..taken.len()).filter(|&i| energies[i] > self.energies[i]);
             let mut shorter: BTreeSet<usize> = rose.flat_map(|i| self.shortened(i, moves)).collect();
@@ -167,14 +167,14 @@ impl<'a> Descent<'a> {
 }
 
 /// Energies of a state (J); infinite where they are not finite.
-struct Measured {
+struct StateEnergies {
     energies: Vec<f64>,
     shares_of_total: Vec<f64>,
     total: f64,
 }
 
 /// Weighted energy of every garment, its own terms and those of every pair that it is part of; and of the outfit.
-fn measured(energy: &SceneEnergy<f32>, state: &Draped) -> Measured {
+fn measured(energy: &SceneEnergy<f32>, state: &Draped) -> StateEnergies {
     let value = energy.value(&state.posed, &state.canonical);
     let own = energy.garments.iter().zip(&value.garments);
     let mut energies: Vec<f64> = own.map(|(garment, raw)| weighted(&garment.weights, raw)).collect();
@@ -187,7 +187,7 @@ fn measured(energy: &SceneEnergy<f32>, state: &Draped) -> Measured {
         }
     }
     let bounded = |e: f64| if e.is_finite() { e } else { f64::INFINITY };
-    Measured {
+    StateEnergies {
         energies: energies.into_iter().map(bounded).collect(),
         shares_of_total: shares.into_iter().map(bounded).collect(),
         total: bounded(value.total),
@@ -274,11 +274,11 @@ mod tests {
         let (energy, rest) = scene(&[0.1, 0.12], &[]);
         let start = stretched(&rest, &[1.1, 1.1]);
         let mut descent = Descent::new(&energy, start.clone());
-        assert_eq!(descent.advance(&stretched(&rest, &[0.7, 1.2]), &WHOLE), [0.0, 0.0]);
+        assert_eq!(descent.advance(&stretched(&rest, &[0.7, 1.2]), &WHOLE_STEP), [0.0, 0.0]);
         assert_eq!(descent.state().posed, start.posed);
-        assert_eq!(descent.advance(&stretched(&rest, &[0.7, 1.05]), &WHOLE), [0.0, 1.0]);
+        assert_eq!(descent.advance(&stretched(&rest, &[0.7, 1.05]), &WHOLE_STEP), [0.0, 1.0]);
         assert_eq!(descent.state().posed, stretched(&rest, &[1.1, 1.05]).posed);
-        assert_eq!(descent.advance_some(&stretched(&rest, &[1.0, 1.0]), &WHOLE, |i| i == 0), [1.0, 0.0]);
+        assert_eq!(descent.advance_some(&stretched(&rest, &[1.0, 1.0]), &WHOLE_STEP, |i| i == 0), [1.0, 0.0]);
         assert_eq!(descent.state().posed, stretched(&rest, &[1.0, 1.05]).posed);
     }
 
@@ -330,7 +330,7 @@ mod tests {
         let mut descent = Descent::new(&energy, start);
         let (energies, total) = (descent.energies().to_vec(), descent.total());
         assert!(Descent::new(&energy, apart.clone()).energies().iter().zip(&energies).all(|(a, b)| a < b));
-        assert_eq!(descent.advance(&apart, &WHOLE), [0.0, 0.0]);
+        assert_eq!(descent.advance(&apart, &WHOLE_STEP), [0.0, 0.0]);
         descent.advance(&apart, &BACKTRACKING);
         assert!(descent.total() <= total);
         // A third tube that no pair connects goes all the way.
@@ -338,7 +338,7 @@ mod tests {
         three.layers[0].weights = energy.layers[0].weights;
         let mut descent = Descent::new(&three, stretched(&rest, &[1.0, 1.0, 1.1]));
         let proposal = stretched(&rest, &[0.96, 1.04, 1.09]);
-        assert_eq!(descent.advance(&proposal, &WHOLE), [0.0, 0.0, 1.0]);
+        assert_eq!(descent.advance(&proposal, &WHOLE_STEP), [0.0, 0.0, 1.0]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
+use std::time::Instant;
 
 /// Wall time by phase (ms); all garments together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -60,4 +61,9 @@ impl PhaseTimes {
     pub fn total(&self) -> f64 {
         self.phases().iter().map(|(_, ms)| ms).sum()
     }
+}
+
+/// Time since `clock` (ms).
+pub(super) fn elapsed(clock: Instant) -> f64 {
+    1e3 * clock.elapsed().as_secs_f64()
 }

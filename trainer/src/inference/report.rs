@@ -1,9 +1,13 @@
 //! What a drape reports: `report.json`.
 
 use super::acceleration::{Acceleration, acceleration};
+use super::bodies::{Bodies, BodyReport};
+use super::drape::Drape;
+use super::draper::Draper;
+use super::outfit::{Outfit, OutfitGarment};
+use super::phase_times::PhaseTimes;
 use super::refine::Refinement;
-use super::{Bodies, BodyReport, Drape, Draper, DraperError, Outfit, PhaseTimes, Smoothing};
-use crate::dataset::DatasetError;
+use super::smooth::Smoothing;
 use crate::score::{DrapedGarment, Score, ScoreDistance, score};
 use crate::system::device::name;
 use crate::system::paths::{lossy, lossy_option};
@@ -11,6 +15,7 @@ use clothcombo_data::asset::{Category, GarmentMaterial};
 use clothcombo_data::fit::FitReport;
 use clothcombo_physics::contact::resolve::Certificate;
 use clothcombo_physics::mesh::TriMesh;
+use miette::{IntoDiagnostic, Report};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -72,7 +77,7 @@ pub struct FrameReport {
 
 /// Everything about a drape.
 #[derive(Clone, Debug, Serialize)]
-pub struct Report {
+pub struct DrapeReport {
     /// The program.
     pub program: String,
     /// Name of the device that the networks ran on.
@@ -111,7 +116,7 @@ pub struct Report {
     pub frames: Vec<FrameReport>,
 }
 
-impl Report {
+impl DrapeReport {
     /// Puts the report of `drapes`, which are on `bodies`, together.
     ///
     /// # Errors
@@ -122,7 +127,7 @@ impl Report {
         drapes: &[Drape],
         bodies: &Bodies,
         smoothing: Option<Smoothing>,
-    ) -> Result<Self, DraperError> {
+    ) -> Result<Self, Report> {
         let (first, moments) = (&drapes[0], &bodies.moments);
         let mut milliseconds = PhaseTimes::default();
         drapes.iter().for_each(|drape| milliseconds += drape.milliseconds);
@@ -183,14 +188,8 @@ impl Drape {
     ///
     /// # Errors
     /// When a value overflows.
-    pub fn score(
-        &self,
-        draper: &Draper,
-        outfit: &Outfit,
-        which: ScoredPositions,
-    ) -> Result<Score, DraperError> {
-        let refused = |e: &dyn std::fmt::Display| DatasetError::Data(e.to_string());
-        let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).map_err(|e| refused(&e))?;
+    pub fn score(&self, draper: &Draper, outfit: &Outfit, which: ScoredPositions) -> Result<Score, Report> {
+        let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).into_diagnostic()?;
         let garments: Vec<DrapedGarment> = outfit
             .garments
             .iter()
@@ -205,13 +204,13 @@ impl Drape {
                 canonical: None,
             })
             .collect();
-        Ok(score(&body, &garments, ScoreDistance::default()).map_err(|e| refused(&e))?)
+        score(&body, &garments, ScoreDistance::default())
     }
 }
 
 fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<DrapedGarmentReport> {
     let all: usize = outfit.garments.iter().map(|p| p.prepared.vertex_count()).sum();
-    let report = |(index, garment): (usize, &super::OutfitGarment)| {
+    let report = |(index, garment): (usize, &OutfitGarment)| {
         let vertices = garment.prepared.vertex_count();
         let share = vertices as f64 / all.max(1) as f64;
         let mut times = PhaseTimes {

@@ -51,7 +51,7 @@ pub struct Arguments {
 }
 
 #[derive(Serialize)]
-struct Measured {
+struct DeviceCosts {
     device: String,
     loss: f64,
     /// Relative difference to the first device.
@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         let worst = differences.max_by(|a, b| a.0.total_cmp(&b.0));
         let found_positions = run.host_drape(&scene)?;
         let costs = run.costs(arguments.seconds, 1)?;
-        rows.push(Measured {
+        rows.push(DeviceCosts {
             device: choice.to_string(),
             loss: found_loss,
             loss_difference: ((found_loss - loss) / loss).abs(),
@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         });
     }
     print_report(arguments.json, &rows, |rows| text(rows))?;
-    let agrees = |row: &&Measured| {
+    let agrees = |row: &&DeviceCosts| {
         row.loss_difference <= arguments.most_loss
             && row.gradient_difference <= arguments.most_gradient
             && row.position_difference_m <= arguments.most_position
@@ -174,8 +174,8 @@ fn difference(found: &[f32], expected: &[f32]) -> f64 {
     if apart == 0.0 { 0.0 } else { apart / norm(&mut expected.iter().map(|v| f64::from(*v))) }
 }
 
-fn text(rows: &[Measured]) -> String {
-    let row = |measured: &Measured| {
+fn text(rows: &[DeviceCosts]) -> String {
+    let row = |measured: &DeviceCosts| {
         row! {
             "device" => measured.device,
             "loss" => format!("{:.6}", measured.loss),

@@ -82,7 +82,7 @@ pub struct Arguments {
 
 /// Results of one case.
 #[derive(Clone, Debug, Serialize)]
-struct Measured {
+struct CaseCosts {
     name: String,
     /// Absent for a stage of a configuration.
     sizes: Option<Case>,
@@ -120,7 +120,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     print_report(arguments.json, &report, |_| tables(&measured))
 }
 
-fn synthetic(arguments: &Arguments, device: &Device) -> Result<Vec<Measured>, Report> {
+fn synthetic(arguments: &Arguments, device: &Device) -> Result<Vec<CaseCosts>, Report> {
     let cases = cases(arguments);
     if arguments.export.is_some() && cases.len() != 1 {
         return Err(miette!(
@@ -157,7 +157,7 @@ fn cases(arguments: &Arguments) -> Vec<Case> {
     }
 }
 
-fn stages(arguments: &Arguments, config: Config, device: &Device) -> Result<Vec<Measured>, Report> {
+fn stages(arguments: &Arguments, config: Config, device: &Device) -> Result<Vec<CaseCosts>, Report> {
     let names: Vec<String> = config.stages.iter().map(|stage| stage.name.clone()).collect();
     let all =
         || names.iter().enumerate().map(|(i, name)| format!("{i} {name:?}")).collect::<Vec<_>>().join(", ");
@@ -189,7 +189,7 @@ fn measure(
     name: String,
     sizes: Option<Case>,
     arguments: &Arguments,
-) -> Result<Option<Measured>, Report> {
+) -> Result<Option<CaseCosts>, Report> {
     if let Some(folder) = &arguments.export {
         export(run, folder)?;
     }
@@ -200,7 +200,7 @@ fn measure(
     let scene = run.scene(0)?;
     let costs = run.costs(arguments.seconds, arguments.accumulate)?;
     let profile = run.profile(arguments.steps)?;
-    Ok(Some(Measured {
+    Ok(Some(CaseCosts {
         name,
         sizes,
         layers: scene.garments.len(),
@@ -212,12 +212,12 @@ fn measure(
 }
 
 fn flattened(
-    measured: impl Iterator<Item = Result<Option<Measured>, Report>>,
-) -> Result<Vec<Measured>, Report> {
+    measured: impl Iterator<Item = Result<Option<CaseCosts>, Report>>,
+) -> Result<Vec<CaseCosts>, Report> {
     measured.filter_map(Result::transpose).collect()
 }
 
-fn picture(measured: &[Measured]) -> image::RgbImage {
+fn picture(measured: &[CaseCosts]) -> image::RgbImage {
     let bars: Vec<Bar> = measured
         .iter()
         .map(|m| Bar {
@@ -240,8 +240,8 @@ fn short(ms: f64) -> String {
     }
 }
 
-fn tables(measured: &[Measured]) -> String {
-    let rows = |row: fn(&Measured) -> Row| measured.iter().map(row).collect::<Vec<_>>();
+fn tables(measured: &[CaseCosts]) -> String {
+    let rows = |row: fn(&CaseCosts) -> Row| measured.iter().map(row).collect::<Vec<_>>();
     format!(
         "Where the time of a training step goes, medians [ms].\n\n{}\n\
          Parts of one scene, medians [ms]; scenes are prepared on another thread.\n\n{}\n\
@@ -252,13 +252,13 @@ fn tables(measured: &[Measured]) -> String {
     )
 }
 
-fn phase_row(m: &Measured) -> Row {
+fn phase_row(m: &CaseCosts) -> Row {
     let mut row = row!["case" => m.name, "step" => short(m.profile.step_ms)];
     row.extend(m.profile.phases_ms.iter().map(|(name, ms)| ((*name).to_owned(), short(*ms))));
     row
 }
 
-fn cost_row(m: &Measured) -> Row {
+fn cost_row(m: &CaseCosts) -> Row {
     row! {
         "case" => m.name,
         "vertices" => m.vertices,
@@ -274,7 +274,7 @@ fn cost_row(m: &Measured) -> Row {
     }
 }
 
-fn term_row(m: &Measured) -> Row {
+fn term_row(m: &CaseCosts) -> Row {
     let ms = |term: Term| m.costs.terms_ms.get(term.name()).map(|ms| short(*ms));
     let mut row = row!["case" => m.name];
     row.extend(Term::ALL.map(|term| (term.name().to_owned(), ms(term).text())));

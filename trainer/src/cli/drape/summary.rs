@@ -1,8 +1,8 @@
 //! The report of a drape as tables for the terminal.
 
-use crate::cli::post_process::stopped;
+use crate::cli::post_process::left_over;
 use crate::cli::table::{Cell, number, row, table};
-use crate::inference::{PhaseTimes, Report};
+use crate::inference::{DrapeReport, PhaseTimes};
 use crate::score::Score;
 use clothcombo_physics::contact::resolve::Certificate;
 
@@ -14,7 +14,7 @@ const TERMS: [(&str, &str); 5] = [
     ("repulsion", "repulsion [1]"),
 ];
 
-pub(super) fn tables(report: &Report) -> String {
+pub(super) fn tables(report: &DrapeReport) -> String {
     let mut parts = vec![garments(report), times(report), scores(report)];
     if !report.certificate.layers.is_empty() {
         parts.push(layers(report));
@@ -23,7 +23,7 @@ pub(super) fn tables(report: &Report) -> String {
     parts.join("\n")
 }
 
-fn garments(report: &Report) -> String {
+fn garments(report: &DrapeReport) -> String {
     let rows = report.garments.iter().map(|g| {
         let repairs = g.fit.as_ref().map(|fit| fit.repairs.len());
         row! {
@@ -41,7 +41,7 @@ fn garments(report: &Report) -> String {
     table(&rows.collect::<Vec<_>>())
 }
 
-fn times(report: &Report) -> String {
+fn times(report: &DrapeReport) -> String {
     let row = |name: &str, times: &PhaseTimes| {
         let mut row = row!["time [ms]" => name];
         row.extend(times.phases().map(|(phase, ms)| (phase.to_string(), format!("{ms:.1}"))));
@@ -55,11 +55,11 @@ fn times(report: &Report) -> String {
 }
 
 /// Scores, the refinement and what the layers were before are those of a motion's first frame.
-fn of_first_frame(report: &Report, what: &str) -> String {
+fn of_first_frame(report: &DrapeReport, what: &str) -> String {
     if report.frames.len() > 1 { format!("{what}, first frame") } else { what.to_owned() }
 }
 
-fn scores(report: &Report) -> String {
+fn scores(report: &DrapeReport) -> String {
     let first = of_first_frame(report, "score");
     let after = report.frames.first().map_or(&report.certificate, |frame| &frame.certificate);
     // Pairs as the certificate counts them.
@@ -82,7 +82,7 @@ fn scores(report: &Report) -> String {
     table(&(0..report.garments.len()).flat_map(both).collect::<Vec<_>>())
 }
 
-fn layers(report: &Report) -> String {
+fn layers(report: &DrapeReport) -> String {
     let first = of_first_frame(report, "layers");
     let after = report.frames.first().map_or(&report.certificate, |frame| &frame.certificate);
     let name = |i: usize| &report.garments[i].name;
@@ -98,7 +98,7 @@ fn layers(report: &Report) -> String {
     table(&rows.collect::<Vec<_>>())
 }
 
-fn certificate(report: &Report) -> String {
+fn certificate(report: &DrapeReport) -> String {
     let found = &report.certificate;
     let of_all = match report.frames.len() {
         0 | 1 => String::new(),
@@ -119,8 +119,8 @@ fn certificate(report: &Report) -> String {
         let percent = (1e3 * strain).round() / 10.0 + 0.0;
         text += &format!(", strain {percent:+.1} %{worst}");
     }
-    if let Some(stopped) = stopped(found) {
-        text += &format!("\n{stopped}");
+    if let Some(left) = left_over(found) {
+        text += &format!("\n{left}");
     }
     let pinched = found.pinched.count();
     if pinched > 0 {

@@ -1,6 +1,5 @@
 //! What a run begins with, checked before anything is made: nothing, a trained model, or a checkpoint of its own.
 
-use super::Arguments;
 use crate::cli::data_check::check_data;
 use crate::cli::loading::load_dataset_for;
 use crate::config::Config;
@@ -17,7 +16,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 /// What a run begins with.
-pub(super) enum Origin {
+pub(super) enum RunOrigin {
     /// A new run, from a model or from nothing.
     New(Option<Box<TrainedModel>>),
     /// A run that goes on, from a checkpoint or, killed before its first, from the start.
@@ -31,24 +30,25 @@ pub(super) struct Loaded {
     pub check: Option<DataCheck>,
 }
 
-impl Origin {
-    /// What the run in `root` begins with.
+impl RunOrigin {
+    /// What the run in `root` begins with. `resume` goes on with it, from the checkpoint there if one is named; the values of the
+    /// keys `allowed` may differ then.
     ///
     /// # Errors
     /// When the folder, the model or the checkpoint cannot be used. Only the lock of an existing run has been touched then.
     pub fn find(
-        arguments: &Arguments,
+        resume: Option<Option<&Path>>,
+        allowed: &[String],
         root: &Path,
         config: &Config,
         group: &ProcessGroup,
     ) -> Result<Self, Report> {
-        let Some(path) = &arguments.resume else {
+        let Some(path) = resume else {
             if group.is_rank_zero() {
                 RunDir::check_free(root)?;
             }
             return Ok(Self::New(start_model(config)?.map(Box::new)));
         };
-        let allowed = &arguments.allow_config_change;
         let run = match group.is_rank_zero() {
             true => RunDir::resume(root, config, allowed)?,
             false => {
@@ -56,7 +56,7 @@ impl Origin {
                 RunDir::follow(root).allowing(AllowedChanges::new(allowed, &[config]).map_err(unknown)?)
             }
         };
-        let checkpoint = newest_or_none(path.as_deref().unwrap_or(root))?;
+        let checkpoint = newest_or_none(path.unwrap_or(root))?;
         match &checkpoint {
             Some(checkpoint) => check_steps(root, checkpoint, config)?,
             None => drop(start_model(config)?),
