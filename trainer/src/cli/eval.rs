@@ -79,9 +79,9 @@ fn named(text: &str) -> Result<(String, PathBuf), String> {
     }
 }
 
-/// Names of the files that make a report.
 /// Outfits of the part `certificates` where it is asked for without their number: a quarter of an hour.
 const OUTFITS: usize = 50;
+/// The files that make a report.
 const JSON: &str = "eval.json";
 const MARKDOWN: &str = "eval.md";
 const HTML: &str = "report.html";

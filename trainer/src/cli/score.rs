@@ -70,18 +70,16 @@ fn tables(score: &Score) -> String {
     // Holding needs canonical meshes.
     let has = |term: &str| garments().any(|g| g.raw.contains_key(term));
     let terms = || TERMS.iter().filter(|(term, ..)| has(term));
-    let raw_row = |name: &str, values: &TermValues| {
-        let mut row = row!["raw" => name];
+    let term_row = |mut row: Row, has_unit: bool, values: &TermValues| {
         for (term, heading, unit) in terms() {
-            row.extend(row![format!("{heading} [{unit}]") => values.get(*term).copied()]);
+            let heading = if has_unit { format!("{heading} [{unit}]") } else { heading.to_string() };
+            row.extend(row![heading => values.get(*term).copied()]);
         }
         row
     };
+    let raw_row = |name: &str, values: &TermValues| term_row(row!["raw" => name], true, values);
     let weighted_row = |name: &str, values: &TermValues| {
-        let mut row = row!["weighted [J]" => name];
-        for (term, heading, _) in terms() {
-            row.extend(row![heading => values.get(*term).copied()]);
-        }
+        let mut row = term_row(row!["weighted [J]" => name], false, values);
         row.extend(row!["sum" => values.values().sum::<f64>()]);
         row
     };

@@ -33,13 +33,12 @@ impl ActiveJoints {
     /// # Errors
     /// The names that `body` has no joint of.
     pub fn named(body: &Body, names: &[String]) -> Result<Self, Vec<String>> {
-        let find =
-            |name: &String| body.joint_names.iter().position(|n| n == name).ok_or_else(|| name.clone());
-        let (found, missing): (Vec<_>, Vec<_>) = names.iter().map(find).partition(Result::is_ok);
-        if !missing.is_empty() {
-            return Err(missing.into_iter().filter_map(Result::err).collect());
+        let find = |name: &String| body.joint_names.iter().position(|n| n == name);
+        let missing: Vec<String> = names.iter().filter(|name| find(name).is_none()).cloned().collect();
+        match missing.is_empty() {
+            true => Ok(Self::of(body, names.iter().filter_map(find).collect())),
+            false => Err(missing),
         }
-        Ok(Self::of(body, found.into_iter().filter_map(Result::ok).collect()))
     }
 
     fn of(body: &Body, indices: Vec<usize>) -> Self {

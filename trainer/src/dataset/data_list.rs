@@ -8,7 +8,7 @@ use clothcombo_data::cache::KeyBuilder;
 use clothcombo_data::folders::list_motion_folder;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
@@ -34,20 +34,12 @@ enum DatumKind {
 }
 
 impl DatumKind {
-    /// The key of the configuration that says where it comes from.
-    fn key(self) -> &'static str {
+    /// What it is called, and the key of the configuration that says where it comes from.
+    fn words(self) -> (&'static str, &'static str) {
         match self {
-            Self::Body => "data.body",
-            Self::Garment => "data.garments",
-            Self::Clip => "data.poses",
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Body => "body",
-            Self::Garment => "garment",
-            Self::Clip => "clip",
+            Self::Body => ("body", "data.body"),
+            Self::Garment => ("garment", "data.garments"),
+            Self::Clip => ("clip", "data.poses"),
         }
     }
 }
@@ -96,17 +88,13 @@ impl DataList {
     /// What is not in this list as it is in `earlier`.
     pub fn changes_since(&self, earlier: &Self) -> Vec<DataChange> {
         let [now, before] = [self, earlier].map(Self::by_name);
-        let names: BTreeMap<_, ()> = now.keys().chain(before.keys()).map(|name| (*name, ())).collect();
-        let differs = names.into_keys().filter(|name| now.get(name) != before.get(name));
+        let names: BTreeSet<_> = now.keys().chain(before.keys()).copied().collect();
+        let differs = names.into_iter().filter(|name| now.get(name) != before.get(name));
         let change = |(kind, name): (DatumKind, &str)| {
-            let side = |list: &BTreeMap<_, Vec<&str>>, missing: &str| {
-                list.get(&(kind, name)).map_or_else(|| missing.to_owned(), |all| all.join(" and "))
-            };
-            let (is, was) = (side(&now, "missing"), side(&before, "missing"));
-            DataChange {
-                key: kind.key(),
-                text: format!("{} {name}: {is} now; {was} in the checkpoint", kind.name()),
-            }
+            let [is, was] = [&now, &before]
+                .map(|list| list.get(&(kind, name)).map_or("missing".to_owned(), |all| all.join(" and ")));
+            let (what, key) = kind.words();
+            DataChange { key, text: format!("{what} {name}: {is} now; {was} in the checkpoint") }
         };
         differs.map(change).collect()
     }

@@ -48,19 +48,15 @@ pub struct GarmentStore {
     joints: ActiveJoints,
     /// Of each garment, what stays in memory: everything without a cache, nothing of what a cache has.
     kept: Vec<Option<Kept>>,
-    streamed: Streamed,
+    /// The others, read from the cache: those used last.
+    recent: LruCache<PreparedGarment>,
+    sources: Vec<GarmentSource>,
+    preprocessor: Preprocessor,
 }
 
 struct Kept {
     garment: Arc<PreparedGarment>,
     operators: Arc<SurfaceOperators>,
-}
-
-/// Reads from the cache, and makes again what is not there.
-struct Streamed {
-    recent: LruCache<PreparedGarment>,
-    sources: Vec<GarmentSource>,
-    preprocessor: Preprocessor,
 }
 
 /// What the first pass over a garment leaves.
@@ -136,7 +132,7 @@ impl GarmentStore {
         };
         let kept = index.into_par_iter().map(finish).collect::<Result<Vec<_>, DatasetError>>()?;
         let recent = LruCache::new(memory, Residence::Host);
-        Ok(Self { infos, joints, kept, streamed: Streamed { recent, sources, preprocessor } })
+        Ok(Self { infos, joints, kept, recent, sources, preprocessor })
     }
 
     /// Computes and stores what the cache of `config` does not hold of every `of`-th garment from garment `part` on, so
@@ -195,13 +191,12 @@ impl GarmentStore {
         if let Some(kept) = &self.kept[index] {
             return Ok(kept.garment.clone());
         }
-        let streamed = &self.streamed;
-        if let Some(garment) = streamed.recent.get(index) {
+        if let Some(garment) = self.recent.get(index) {
             return Ok(garment);
         }
-        let garment = streamed.read(index, &self.infos[index], &self.joints)?;
+        let garment = self.read(index)?;
         let bytes = garment.bytes();
-        Ok(streamed.recent.insert(index, garment, bytes))
+        Ok(self.recent.insert(index, garment, bytes))
     }
 
     /// DiffusionNet's operators of garment `index`.
@@ -209,38 +204,30 @@ impl GarmentStore {
     /// # Errors
     /// As [`garment`](Self::garment).
     pub fn operators(&self, index: usize) -> Result<Arc<SurfaceOperators>, DatasetError> {
-        match &self.kept[index] {
-            Some(kept) => Ok(kept.operators.clone()),
-            None => self.streamed.operators(index, &self.infos[index]).map(Arc::new),
+        if let Some(kept) = &self.kept[index] {
+            return Ok(kept.operators.clone());
         }
+        let GarmentInfo { name, mesh, .. } = &self.infos[index];
+        let operators = match self.preprocessor.stored_operators(*mesh) {
+            Some(operators) => operators,
+            None => self.preprocessor.operators(name, &self.again(index)?.rest, *mesh)?,
+        };
+        Ok(Arc::new(operators))
     }
-}
 
-impl Streamed {
-    fn read(
-        &self,
-        index: usize,
-        info: &GarmentInfo,
-        joints: &ActiveJoints,
-    ) -> Result<PreparedGarment, DatasetError> {
-        let (rest, binding) = match self.preprocessor.stored_binding(info.mesh, info.category) {
+    /// Garment `index`, from the cache.
+    fn read(&self, index: usize) -> Result<PreparedGarment, DatasetError> {
+        let GarmentInfo { name, category, holding, material, source, mesh, .. } = self.infos[index].clone();
+        let (rest, binding) = match self.preprocessor.stored_binding(mesh, category) {
             Some(found) => found,
             None => {
                 let garment = self.again(index)?;
-                let binding = self.preprocessor.binding(&garment, info.mesh);
+                let binding = self.preprocessor.binding(&garment, mesh);
                 (garment.rest, binding)
             }
         };
-        let GarmentInfo { name, category, holding, material, source, .. } = info.clone();
         let garment = Garment { name, category, rest, holding, material, source };
-        self.preprocessor.finish(garment, binding, joints)
-    }
-
-    fn operators(&self, index: usize, info: &GarmentInfo) -> Result<SurfaceOperators, DatasetError> {
-        match self.preprocessor.stored_operators(info.mesh) {
-            Some(operators) => Ok(operators),
-            None => self.preprocessor.operators(&info.name, &self.again(index)?.rest, info.mesh),
-        }
+        self.preprocessor.finish(garment, binding, &self.joints)
     }
 
     /// Garment `index`, whose record was there at the start of the run and no longer is.

@@ -5,7 +5,6 @@ use super::page::Picture;
 use super::table::{Column, median_with_interval, plain};
 use super::{Estimate, Evaluator, Metric, Section, Table, drape_by, median_ms};
 use crate::dataset::PreparedScene;
-use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::reference::{ReferenceScene, wide};
 use crate::inference::tensor_store::DrapeError;
 use crate::inference::{RefineSteps, refine};
@@ -13,6 +12,7 @@ use crate::picture::chart::{Chart, ChartGrid, Line};
 use crate::picture::png_bytes;
 use crate::run::validation::Method;
 use crate::system::single_threaded::map_single_threaded;
+use clothcombo_model::Mode;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::equilibrium::{Problem, SolverSettings, Stop, solve};
 use miette::{IntoDiagnostic, Report};
@@ -198,8 +198,8 @@ fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<
     for method in [Method::Lbs, Method::LbsWithShapeTransfer] {
         states.push(timed(method)?);
     }
-    let milliseconds = median_ms(SECONDS, || networks.forward(scene, LayerInteraction::Together))?;
-    let positions = wide(&networks.forward(scene, LayerInteraction::Together)?.posed);
+    let milliseconds = median_ms(SECONDS, || networks.forward(scene, Mode::Layered))?;
+    let positions = wide(&networks.forward(scene, Mode::Layered)?.posed);
     states.push(State { method: "network, forward pass".to_owned(), milliseconds, positions });
     let network = timed(Method::Network)?;
     let draped = networks.drape(scene)?;

@@ -35,7 +35,6 @@ mod draper;
 mod embed;
 mod embedded;
 mod frame;
-pub mod layer_interaction;
 mod motion;
 mod names;
 mod network_drape;

@@ -3,7 +3,6 @@
 use super::bodies::BodyState;
 use super::drape::round;
 use super::draper::Draper;
-use super::layer_interaction::LayerInteraction;
 use super::networks::drape_on;
 use super::on_body::OnBody;
 use super::outfit::Outfit;
@@ -11,6 +10,7 @@ use super::phase_times::{PhaseTimes, elapsed};
 use super::tensor_store::body_tensors;
 use crate::dataset::{BodySample, PreparedScene, SceneSample};
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
+use clothcombo_model::Mode;
 use clothcombo_physics::contact::resolve::PathSample;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::transform::Transform;
@@ -106,7 +106,7 @@ impl Draper {
         let (outfit_tensors, embeddings) = (&outfit.tensors, &outfit.embeddings);
         let on_body =
             OnBody { scene, outfit: outfit_tensors, embeddings, body: &tensors, start: start_tensor };
-        let (draped, times) = drape_on(&self.model, &on_body, LayerInteraction::Together);
+        let (draped, times) = drape_on(&self.model, &on_body, Mode::Layered);
 
         let turned = |p: &[f32; 3]| add(apply(&start.turn, p.map(f64::from)), body.place);
         let network: Vec<[f64; 3]> = draped.posed.iter().map(turned).collect();

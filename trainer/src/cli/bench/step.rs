@@ -4,29 +4,25 @@ use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::output::print_report;
 use crate::cli::table::{Cell, Row, markdown, row};
-use crate::cli::values::{at_least_one, folder_to_make, measuring_seconds, picture_file};
+use crate::cli::values::{at_least_one, folder_to_make, measuring_seconds};
 use crate::cli::verbosity::print_status;
 use crate::config::{Config, load};
-use crate::picture::chart::{Bar, draw_bars};
-use crate::picture::save_png;
 use crate::system::device::name;
-use crate::training::measure::{BenchmarkRun, Case, Costs, PHASES, Profile, export};
+use crate::training::measure::{BenchmarkRun, Case, Costs, Profile, export};
 use burn::module::Module;
 use burn::tensor::Device;
 use clap::Parser;
 use clothcombo_physics::energy::Term;
-use miette::{IntoDiagnostic, Report, miette};
+use miette::{Report, miette};
 use serde::Serialize;
 use std::path::PathBuf;
 
 /// Where the time of a training step goes
 #[derive(Parser)]
-#[command(
-    after_help = "Examples:\n  clothcombo bench step --widths 64,128 --layers 1,3 --picture step.png\n  \
-        clothcombo bench step --config configs/open.toml --picture open.png --json > open.json\n  \
+#[command(after_help = "Examples:\n  clothcombo bench step --widths 64,128 --layers 1,3\n  \
+        clothcombo bench step --config configs/open.toml --json > open.json\n  \
         clothcombo bench step --config configs/paper.toml --stage 1 --set model.width=64 --export case\n\n\
-        Two threads and fewer: RAYON_NUM_THREADS=2. Nothing else should run meanwhile."
-)]
+        Two threads and fewer: RAYON_NUM_THREADS=2. Nothing else should run meanwhile.")]
 pub struct Arguments {
     /// Measures the stages of this configuration instead of synthetic runs
     #[arg(long, value_name = "FILE", conflicts_with_all = ["widths", "layers", "vertices", "eigen_count", "blocks", "bodies"])]
@@ -66,9 +62,6 @@ pub struct Arguments {
     seconds: f64,
     #[command(flatten)]
     device: DeviceArgument,
-    /// Writes the shares of a step as stacked bars (PNG)
-    #[arg(long, value_name = "FILE", value_parser = picture_file())]
-    picture: Option<PathBuf>,
     /// Writes scene, networks and results of the only case or stage into a folder, for scripts/bench_torch.py
     #[arg(long, value_name = "DIR", value_parser = folder_to_make())]
     export: Option<PathBuf>,
@@ -108,9 +101,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     };
     if arguments.export_only {
         return Ok(());
-    }
-    if let Some(path) = &arguments.picture {
-        save_png(&picture(&measured), path).into_diagnostic()?;
     }
     let report = serde_json::json!({
         "threads": rayon::current_num_threads(),
@@ -215,18 +205,6 @@ fn flattened(
     measured: impl Iterator<Item = Result<Option<CaseCosts>, Report>>,
 ) -> Result<Vec<CaseCosts>, Report> {
     measured.filter_map(Result::transpose).collect()
-}
-
-fn picture(measured: &[CaseCosts]) -> image::RgbImage {
-    let bars: Vec<Bar> = measured
-        .iter()
-        .map(|m| Bar {
-            label: m.name.clone(),
-            parts: m.profile.phases_ms.iter().map(|(_, ms)| *ms).collect(),
-            total: format!("{} ms", short(m.profile.step_ms)),
-        })
-        .collect();
-    draw_bars("Time of a training step by part", &PHASES, &bars)
 }
 
 /// Three digits.

@@ -309,11 +309,9 @@ fn show_progress(bar: &ProgressBar) -> impl FnMut(DrapeProgress) {
 
 fn print(arguments: &Arguments, reports: &[(&str, DrapeReport)]) -> Result<(), Report> {
     match (arguments.json, reports) {
-        (true, [(_, only)]) => return print_json(only),
+        (true, [(_, only)]) => print_json(only)?,
         (true, several) => {
-            return print_json(
-                &several.iter().map(|(name, report)| (name, report)).collect::<BTreeMap<_, _>>(),
-            );
+            print_json(&several.iter().map(|(name, report)| (name, report)).collect::<BTreeMap<_, _>>())?;
         }
         (false, [(_, only)]) => print!("{}", summary::tables(only)),
         (false, several) => {

@@ -98,11 +98,6 @@ pub(super) fn hold_out(clips: &[&Motion], config: &PoseConfig) -> HeldOutFrames 
     HeldOutFrames { purposes, note }
 }
 
-/// Seconds of the shortest clip that can have a window by itself.
-pub(super) fn shortest_clip(config: &PoseConfig) -> f64 {
-    SHORTEST_WINDOW * config.blocks_per_window() as f64
-}
-
 /// The clips without a window that are held out whole, so that `wanted` seconds are held out together with those `in_windows`.
 fn whole_clips(
     clips: &[&Motion],
@@ -161,7 +156,7 @@ fn in_blocks(clip: &Motion, block: f64, margin: f64, config: &PoseConfig) -> Vec
 pub(super) fn remedy(clips: &[&Motion], config: &PoseConfig) -> String {
     let more = format!(
         "add clips: one of {:.1} s is split, and of several, one that is at most a third of the time of all is held out whole",
-        shortest_clip(config)
+        SHORTEST_WINDOW * config.blocks_per_window() as f64
     );
     let longest = clips.iter().max_by_key(|clip| clip.poses.len());
     let Some(clip) = longest.filter(|clip| clip.poses.len() > 1) else { return more };
