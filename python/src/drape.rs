@@ -5,8 +5,7 @@ use crate::call::{call, refused_text};
 use clothcombo_physics::contact::resolve::Certificate;
 use clothcombo_trainer::inference::output::{Show, Staged, write};
 use clothcombo_trainer::inference::{
-    Bodies, Drape as FrameDrape, DrapeReport, Draper, GarmentDrape, Outfit, OutfitGarment, ScoredPositions,
-    Smoothing,
+    Bodies, Drape as FrameDrape, DrapeReport, Draper, GarmentDrape, Outfit, OutfitGarment, Smoothing,
 };
 use miette::Report;
 use numpy::{PyArray2, PyArray3};
@@ -119,7 +118,7 @@ impl Drape {
     fn score<'py>(&self, py: Python<'py>, frame: usize) -> PyResult<Bound<'py, PyAny>> {
         let none = || refused_text(format!("no frame {frame} of {}", self.drapes.len()));
         let drape = self.drapes.get(frame).ok_or_else(none)?;
-        let score = call(py, &[], || drape.score(&self.draper, &self.outfit, ScoredPositions::Result))?;
+        let score = call(py, &[], || drape.score(&self.draper, &self.outfit, |garment| &garment.positions))?;
         from_json(py, &score)
     }
 

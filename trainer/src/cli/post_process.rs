@@ -2,7 +2,7 @@
 
 use super::values::{gap_mm, seconds};
 use clap::Args;
-use clothcombo_physics::contact::resolve::{Certificate, ResolveSettings};
+use clothcombo_physics::contact::resolve::ResolveSettings;
 use std::time::Duration;
 
 /// What the post-process is to do.
@@ -24,10 +24,9 @@ impl PostProcessArguments {
     }
 }
 
-/// What is left and what to do about it, if anything is left or the budget ended the post-process.
-pub fn left_over(certificate: &Certificate) -> Option<String> {
-    let pairs = certificate.pairs();
-    let (stopped, longer) = match (certificate.is_stopped, pairs) {
+/// What to do about `pairs` that are left, or a budget that ended the post-process.
+pub fn left_over(pairs: usize, is_stopped: bool) -> Option<String> {
+    let (stopped, longer) = match (is_stopped, pairs) {
         (false, 0) => return None,
         (false, _) => ("", ""),
         (true, _) => ("stopped after its budget, ", "a longer --time-limit if there is one, "),

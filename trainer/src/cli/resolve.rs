@@ -166,7 +166,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             .collect(),
     };
     spinner("writing", || write(staged, &body, &garments, &resolved, &report))?;
-    print_report(arguments.json, &report, text)
+    print_report(arguments.json, &report, |report| text(report, arguments.keep_self))
 }
 
 fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<ReadGarment>, Report> {
@@ -276,7 +276,7 @@ fn moved(garment: &ReadGarment, positions: &[[f64; 3]]) -> Result<MovedObj, Repo
     Ok(MovedObj { obj: text.into_bytes(), mtl: None, libraries: Vec::new() })
 }
 
-fn text(report: &ResolveReport) -> String {
+fn text(report: &ResolveReport, keeps_self: bool) -> String {
     let row = |what: &str, value: fn(&Certificate) -> Option<f64>| {
         let [before, after] = [&report.certificate_before, &report.certificate].map(value);
         row!["" => what, "before" => before, "after" => after]
@@ -301,6 +301,8 @@ fn text(report: &ResolveReport) -> String {
             "file" => garment.output.display().to_string(),
         }
     });
-    let left = left_over(&report.certificate).map_or_else(String::new, |text| format!("\n{text}\n"));
+    let found = &report.certificate;
+    let pairs = if keeps_self { found.between() } else { found.pairs() };
+    let left = left_over(pairs, found.is_stopped).map_or_else(String::new, |text| format!("\n{text}\n"));
     format!("{}\n{}{left}", table(&rows), table(&garments.collect::<Vec<_>>()))
 }

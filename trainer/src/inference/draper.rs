@@ -72,8 +72,7 @@ impl Draper {
             None => shipped_model()?,
         };
         let (body, shape_space) = body_of(&trained, settings.body.as_deref())?;
-        let joints = ActiveJoints::named(&body, &trained.state.joints)
-            .map_err(|missing| missing_joints(&body.name, &missing))?;
+        let joints = ActiveJoints::named(&body, &trained.state.joints).expect("the body has them by now");
         let model = trained.networks(&settings.device)?;
         let mut preprocessor = Preprocessor::new(&trained.config, Arc::new(body));
         if let Some(folder) = &settings.cache {
@@ -164,16 +163,14 @@ fn body_of(trained: &TrainedModel, named: Option<&str>) -> Result<(Body, ShapeSp
         }
     };
     let name = body.name.clone();
-    let body = body.with_joints(&trained.state.joints).map_err(|missing| missing_joints(&name, &missing))?;
+    let body = body.with_joints(&trained.state.joints).map_err(|missing| {
+        miette!(
+            help = "use the body the model was trained on, or one with joints of the same names",
+            "body '{name}' has no joint {}",
+            missing.join(", ")
+        )
+    })?;
     Ok((body, shape_space))
-}
-
-fn missing_joints(body: &str, missing: &[String]) -> Report {
-    miette!(
-        help = "use the body the model was trained on, or one with joints of the same names",
-        "body '{body}' has no joint {}",
-        missing.join(", ")
-    )
 }
 
 /// The body the model was trained on.

@@ -68,7 +68,7 @@ pub use names::UniqueNames;
 pub use outfit::{Outfit, OutfitGarment};
 pub use phase_times::PhaseTimes;
 pub use refine::{RefineSteps, Refinement, refine};
-pub use report::{DrapeReport, DrapedGarmentReport, FrameReport, ModelReport, ScoredPositions};
+pub use report::{DrapeReport, DrapedGarmentReport, FrameReport, ModelReport};
 pub use shipped::shipped_model;
 pub use smooth::{MOST_RADIUS, Smoothing};
 pub use source::{GarmentCatalog, GivenGarment};

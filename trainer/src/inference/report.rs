@@ -2,7 +2,7 @@
 
 use super::acceleration::{Acceleration, acceleration};
 use super::bodies::{Bodies, BodyReport};
-use super::drape::Drape;
+use super::drape::{Drape, GarmentDrape};
 use super::draper::Draper;
 use super::outfit::{Outfit, OutfitGarment};
 use super::phase_times::PhaseTimes;
@@ -138,8 +138,9 @@ impl DrapeReport {
         let (certificate_before, (before, after)) = rayon::join(
             || first.certificate_before(draper, outfit),
             || {
-                let score = |which| first.score(draper, outfit, which);
-                rayon::join(|| score(ScoredPositions::Network), || score(ScoredPositions::Result))
+                let score =
+                    |positions: fn(&GarmentDrape) -> &Vec<[f64; 3]>| first.score(draper, outfit, positions);
+                rayon::join(|| score(|g| &g.network), || score(|g| &g.positions))
             },
         );
         let frames = drapes.iter().zip(moments).map(|(drape, moment)| FrameReport {
@@ -174,21 +175,17 @@ impl DrapeReport {
     }
 }
 
-/// Which positions of a drape are scored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ScoredPositions {
-    /// Of the networks.
-    Network,
-    /// The result.
-    Result,
-}
-
 impl Drape {
-    /// Scores this drape by the paper's energies (see [`crate::score`]).
+    /// Scores these `positions` of the garments by the paper's energies (see [`crate::score`]).
     ///
     /// # Errors
     /// When a value overflows.
-    pub fn score(&self, draper: &Draper, outfit: &Outfit, which: ScoredPositions) -> Result<Score, Report> {
+    pub fn score(
+        &self,
+        draper: &Draper,
+        outfit: &Outfit,
+        positions: fn(&GarmentDrape) -> &Vec<[f64; 3]>,
+    ) -> Result<Score, Report> {
         let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).into_diagnostic()?;
         let garments: Vec<DrapedGarment> = outfit
             .garments
@@ -197,10 +194,7 @@ impl Drape {
             .map(|(garment, drape)| DrapedGarment {
                 name: &garment.name,
                 rest: &garment.prepared.garment.rest,
-                positions: match which {
-                    ScoredPositions::Network => &drape.network,
-                    ScoredPositions::Result => &drape.positions,
-                },
+                positions: positions(drape),
                 canonical: None,
             })
             .collect();
