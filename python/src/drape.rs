@@ -7,7 +7,6 @@ use clothcombo_trainer::inference::output::{Show, Staged, write};
 use clothcombo_trainer::inference::{
     Bodies, Drape as FrameDrape, DrapeReport, Draper, GarmentDrape, Outfit, OutfitGarment, Smoothing,
 };
-use miette::Report;
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 use std::path::PathBuf;
