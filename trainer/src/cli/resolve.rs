@@ -132,20 +132,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let certificate_before =
         spinner("counting intersections", || certify(&surface, &layers)).map_err(named)?;
     let resolved = spinner("resolving", || resolve(&surface, &layers, &settings)).map_err(named)?;
-    let scored = |positions: &dyn Fn(usize) -> Vec<[f64; 3]>| -> Result<Score, Report> {
-        let all: Vec<Vec<[f64; 3]>> = (0..garments.len()).map(positions).collect();
-        let draped: Vec<DrapedGarment> = garments
-            .iter()
-            .zip(&all)
-            .map(|(g, positions)| DrapedGarment { name: &g.name, rest: &g.rest, positions, canonical: None })
-            .collect();
+    let scored = |positions: Vec<&[[f64; 3]]>| {
+        let draped = |(g, positions)| {
+            let ReadGarment { name, rest, .. }: &ReadGarment = g;
+            DrapedGarment { name, rest, positions, canonical: None }
+        };
+        let draped: Vec<DrapedGarment> = garments.iter().zip(positions).map(draped).collect();
         score(&body, &draped, ScoreDistance::Surface)
     };
     let ms = |time: Duration| 1e3 * time.as_secs_f64();
     let report = ResolveReport {
         gap_mm: arguments.post_process.gap_mm,
-        before: spinner("scoring", || scored(&|i| garments[i].draped.positions().to_vec()))?,
-        after: spinner("scoring", || scored(&|i| resolved.positions[i].clone()))?,
+        before: spinner("scoring", || scored(garments.iter().map(|g| g.draped.positions()).collect()))?,
+        after: spinner("scoring", || scored(resolved.positions.iter().map(Vec::as_slice).collect()))?,
         certificate_before,
         certificate: resolved.certificate.clone(),
         milliseconds: Milliseconds {

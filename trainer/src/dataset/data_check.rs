@@ -5,7 +5,6 @@ use super::error::DatasetError;
 use super::garment_source::GarmentSource;
 use crate::config::Config;
 use crate::system::paths::lossy;
-use clothcombo_data::asset::Body;
 use clothcombo_data::check::{Checker, FileCheck, ManifestHints, Target};
 use clothcombo_data::folders::{ListedGarment, list_motion_folder};
 use rayon::prelude::*;
@@ -70,8 +69,10 @@ impl DataCheck {
             return Ok(Self::default());
         }
         let body = load_body(&config.data.body, config.data.shape_components)?;
-        if let Some(fault) = body_fault(&body, &config.data.body) {
+        if let Some(what) = body.implausibility() {
             // Everything else would be measured on it.
+            let remedy = "convert it to metres, y up, facing +z".into();
+            let fault = Fault { name: body.name.clone(), file: (&config.data.body).into(), what, remedy };
             return Ok(Self { files: 1, faults: vec![fault], warnings: Vec::new() });
         }
         let checker = Checker::new(body);
@@ -105,15 +106,6 @@ fn garment(source: GarmentSource) -> Option<CheckedFile> {
 fn motion(path: PathBuf) -> CheckedFile {
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     CheckedFile { name, target: Target::Npz { path } }
-}
-
-fn body_fault(body: &Body, file: &str) -> Option<Fault> {
-    body.implausibility().map(|what| Fault {
-        name: body.name.clone(),
-        file: file.into(),
-        what,
-        remedy: "convert it to metres, y up, facing +z".into(),
-    })
 }
 
 fn fault(file: &CheckedFile, found: &FileCheck, reason: &str, body: &str) -> Fault {

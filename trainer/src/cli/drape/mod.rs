@@ -13,7 +13,7 @@ use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::inference::output::{Show, Staged, write};
 use crate::inference::{
-    Bodies, DrapeProgress, DrapeReport, Draper, DraperSettings, MOST_RADIUS, Outfit, RefineSteps,
+    Bodies, DrapeProgress, DrapeReport, Draper, DraperSettings, GivenGarment, MOST_RADIUS, RefineSteps,
 };
 use crate::system::files::write_json;
 use crate::system::paths::user_cache;
@@ -26,7 +26,7 @@ use job::{Job, RequestedGarment, ordered};
 use miette::{IntoDiagnostic, Report, miette};
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
@@ -201,15 +201,33 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         drapes => progress_bar(drapes, "drapes {bar:30} {pos}/{len} · {eta} left{prefix}{msg}"),
     };
     bar.enable_steady_tick(Duration::from_millis(200));
+    let drape = |job: &Job, sources: Vec<GivenGarment>, bodies: &Bodies| -> Result<DrapeReport, Report> {
+        let (folder, outfit) = (staged.folder(), draper.outfit(sources)?);
+        let (drapes, smoothing) =
+            draper.drape_bodies(&outfit, bodies, arguments.smooth, show_progress(&bar))?;
+        bar.set_prefix("");
+        let title = match job.name.as_str() {
+            "outfit" => outfit.names().collect::<Vec<_>>().join(", "),
+            name => name.to_owned(),
+        };
+        let show = Show {
+            draper: &draper,
+            outfit: &outfit,
+            bodies,
+            drapes: &drapes,
+            smoothing: smoothing.as_ref(),
+            title: &title,
+            all_frames: arguments.all_frames,
+        };
+        match jobs.len() {
+            1 => write(folder, &show),
+            _ => write(&folder.join(&job.name), &show),
+        }
+    };
     let mut reports = Vec::new();
     for (job, (sources, bodies)) in jobs.iter().zip(wanted) {
-        let folder = match jobs.len() {
-            1 => staged.folder().to_owned(),
-            _ => staged.folder().join(&job.name),
-        };
-        let outfit = draper.outfit(sources).map_err(|failure| blame(job, failure))?;
-        let report = drape_job(arguments, &draper, &outfit, job, &bodies, &folder, &bar);
-        reports.push((job.name.as_str(), report.map_err(|failure| blame(job, failure))?));
+        let report = drape(job, sources, &bodies).map_err(|failure| blame(job, failure))?;
+        reports.push((job.name.as_str(), report));
     }
     bar.finish_and_clear();
     if jobs.len() > 1 {
@@ -258,33 +276,6 @@ fn settings(arguments: &Arguments, body: Option<String>) -> Result<DraperSetting
         post_process: arguments.post_process.settings(),
         ..DraperSettings::default()
     })
-}
-
-fn drape_job(
-    arguments: &Arguments,
-    draper: &Draper,
-    outfit: &Outfit,
-    job: &Job,
-    bodies: &Bodies,
-    folder: &Path,
-    bar: &ProgressBar,
-) -> Result<DrapeReport, Report> {
-    let (drapes, smoothing) = draper.drape_bodies(outfit, bodies, arguments.smooth, show_progress(bar))?;
-    bar.set_prefix("");
-    let title = match job.name.as_str() {
-        "outfit" => outfit.names().collect::<Vec<_>>().join(", "),
-        name => name.to_owned(),
-    };
-    let show = Show {
-        draper,
-        outfit,
-        bodies,
-        drapes: &drapes,
-        smoothing: smoothing.as_ref(),
-        title: &title,
-        all_frames: arguments.all_frames,
-    };
-    write(folder, &show)
 }
 
 fn show_progress(bar: &ProgressBar) -> impl FnMut(DrapeProgress) {
