@@ -1,7 +1,7 @@
 //! `clothcombo score`: anyone's draped meshes, measured.
 
 use super::output::print_report;
-use super::table::{Row, row, table};
+use super::table::{Row, number, row, table};
 use crate::score::{NamedMesh, SceneMeshes, Score, ScoreDistance, TermValues, score_meshes};
 use clap::Parser;
 use miette::Report;
@@ -65,23 +65,21 @@ const TERMS: [(&str, &str, &str); 6] = [
     ("holding", "holding", "m²"),
 ];
 
+/// Cells of the terms that have values, whose headings name the units `with_units`.
+pub(super) fn term_cells(values: &TermValues, with_units: bool) -> Row {
+    let cell = |(term, heading, unit): &(&str, &str, &str)| {
+        let heading = if with_units { format!("{heading} [{unit}]") } else { heading.to_string() };
+        Some((heading, number(*values.get(*term)?)))
+    };
+    TERMS.iter().filter_map(cell).collect()
+}
+
 fn tables(score: &Score) -> String {
     let garments = || score.garments.iter();
-    // Holding needs canonical meshes.
-    let has = |term: &str| garments().any(|g| g.raw.contains_key(term));
-    let terms = || TERMS.iter().filter(|(term, ..)| has(term));
-    let term_row = |mut row: Row, has_unit: bool, values: &TermValues| {
-        for (term, heading, unit) in terms() {
-            let heading = if has_unit { format!("{heading} [{unit}]") } else { heading.to_string() };
-            row.extend(row![heading => values.get(*term).copied()]);
-        }
-        row
-    };
-    let raw_row = |name: &str, values: &TermValues| term_row(row!["raw" => name], true, values);
+    let raw_row = |name: &str, values: &TermValues| [row!["raw" => name], term_cells(values, true)].concat();
     let weighted_row = |name: &str, values: &TermValues| {
-        let mut row = term_row(row!["weighted [J]" => name], false, values);
-        row.extend(row!["sum" => values.values().sum::<f64>()]);
-        row
+        let sum = row!["sum" => values.values().sum::<f64>()];
+        [row!["weighted [J]" => name], term_cells(values, false), sum].concat()
     };
     let mut raw: Vec<Row> = garments().map(|g| raw_row(&g.name, &g.raw)).collect();
     let mut weighted: Vec<Row> = garments().map(|g| weighted_row(&g.name, &g.weighted)).collect();

@@ -10,7 +10,7 @@ use std::time::Duration;
 /// No vertex moves farther than this in one step (m): about as far as the faces of the body near it stay the same.
 const STEP_BOUND: f64 = 0.02;
 /// With [`RefineSteps::Auto`], refinement ends with a step that lowers the energy by less than this share of all steps together…
-const LEAST_GAIN: f64 = 0.01;
+const LEAST_REFINE_GAIN: f64 = 0.01;
 /// …or after this time.
 const MOST_TIME: Duration = Duration::from_secs(2);
 /// Refinement ends where a vertex has come farther than this from where it began (m).
@@ -28,7 +28,7 @@ pub enum RefineSteps {
 }
 
 /// Most steps that are taken: far more than gain anything.
-const MOST_STEPS: usize = 1000;
+const MOST_REFINE_STEPS: usize = 1000;
 
 impl RefineSteps {
     /// At most so many, if that is a number of steps that is worth asking for.
@@ -36,9 +36,9 @@ impl RefineSteps {
     /// # Errors
     /// For more than 1000, in words.
     pub fn at_most(steps: usize) -> Result<Self, String> {
-        match steps <= MOST_STEPS {
+        match steps <= MOST_REFINE_STEPS {
             true => Ok(Self::AtMost(steps)),
-            false => Err(format!("it must be at most {MOST_STEPS} steps, or auto")),
+            false => Err(format!("it must be at most {MOST_REFINE_STEPS} steps, or auto")),
         }
     }
 
@@ -119,10 +119,10 @@ pub fn refine(
     Ok((solution.positions, done))
 }
 
-/// Whether the last of the steps between `energies` lowered them by less than [`LEAST_GAIN`] of what all did.
+/// Whether the last of the steps between `energies` lowered them by less than [`LEAST_REFINE_GAIN`] of what all did.
 fn is_enough(energies: &[f64]) -> bool {
     match energies {
-        [first, .., before, last] => before - last < LEAST_GAIN * (first - last),
+        [first, .., before, last] => before - last < LEAST_REFINE_GAIN * (first - last),
         _ => false,
     }
 }

@@ -1,18 +1,11 @@
 //! The report of a drape as tables for the terminal.
 
 use crate::cli::post_process::left_over;
-use crate::cli::table::{Cell, number, row, table};
+use crate::cli::score::term_cells;
+use crate::cli::table::{number, row, table};
 use crate::inference::{DrapeReport, PhaseTimes};
 use crate::score::Score;
 use clothcombo_physics::contact::resolve::Certificate;
-
-const TERMS: [(&str, &str); 5] = [
-    ("strain", "strain [J]"),
-    ("bending", "bending [J]"),
-    ("gravity", "gravity [J]"),
-    ("body_collision", "collision [m³]"),
-    ("repulsion", "repulsion [1]"),
-];
 
 pub(super) fn tables(report: &DrapeReport) -> String {
     let mut parts = vec![garments(report), times(report), scores(report)];
@@ -65,16 +58,15 @@ fn scores(report: &DrapeReport) -> String {
     // Pairs as the certificate counts them.
     let row = |score: &Score, certificate: &Certificate, state: &str, index: usize| {
         let (garment, pairs) = (&score.garments[index], &certificate.garments[index]);
-        let mut row = row![first => garment.name, "state" => state];
-        row.extend(TERMS.map(|(term, heading)| (heading.to_owned(), garment.raw.get(term).text())));
-        row.extend(row! {
+        let contact = row! {
             "inside, nearest vertex [%]" => 100.0 * garment.penetration.vertices_inside,
             "depth, nearest vertex [mm]" => garment.penetration.max_depth_mm,
             "body pairs" => pairs.body_triangle_pairs,
             "layer pairs" => pairs.layer_triangle_pairs,
             "self pairs" => pairs.self_triangle_pairs,
-        });
-        row
+        };
+        let name = row![first => garment.name, "state" => state];
+        [name, term_cells(&garment.raw, true), contact].concat()
     };
     let both = |i| {
         [row(&report.before, &report.certificate_before, "before", i), row(&report.after, after, "after", i)]

@@ -5,13 +5,13 @@ use crate::picture::{DressedRow, draw_dressed};
 use image::RgbImage;
 
 /// Rows of a motion's picture.
-const MOST_ROWS: usize = 4;
+const PICTURE_ROWS: usize = 4;
 
 pub(super) fn draw(show: &Show) -> RgbImage {
     let count = show.drapes.len();
     let shown: Vec<usize> = match count {
-        0..=MOST_ROWS => (0..count).collect(),
-        _ => (0..MOST_ROWS).map(|row| row * (count - 1) / (MOST_ROWS - 1)).collect(),
+        0..=PICTURE_ROWS => (0..count).collect(),
+        _ => (0..PICTURE_ROWS).map(|row| row * (count - 1) / (PICTURE_ROWS - 1)).collect(),
     };
     let rows: Vec<DressedRow> = shown.into_iter().map(|frame| row(show, frame)).collect();
     let names: Vec<&str> = show.outfit.names().collect();
