@@ -25,13 +25,9 @@ pub struct Preprocessor {
     pub energy: EnergySettings,
     /// Eigenpairs a garment is described with.
     pub eigen_count: usize,
-    pub(super) cache: Option<GarmentCache>,
-}
-
-/// Bindings, operators and embeddings on disk, by the content of the rest mesh.
-pub(super) struct GarmentCache {
-    arrays: ArrayCache,
-    body: Key,
+    /// Bindings, operators and embeddings on disk, by the content of the rest mesh.
+    cache: Option<ArrayCache>,
+    body_key: Key,
     /// Why something could not be stored; nothing more is stored then.
     failure: OnceLock<CacheError>,
 }
@@ -41,6 +37,7 @@ impl Preprocessor {
     pub fn new(config: &Config, body: Arc<Body>) -> Self {
         let start = &config.start;
         Self {
+            body_key: body_key(&body),
             body,
             binding: BindingSettings {
                 smoothing_iterations: start.smoothing_iterations,
@@ -51,13 +48,13 @@ impl Preprocessor {
             energy: config.losses.energy_settings(),
             eigen_count: config.model.eigen_count,
             cache: None,
+            failure: OnceLock::new(),
         }
     }
 
     /// The same with a cache.
-    pub fn with_cache(self, arrays: ArrayCache) -> Self {
-        let body = body_key(&self.body);
-        Self { cache: Some(GarmentCache { arrays, body, failure: OnceLock::new() }), ..self }
+    pub fn with_cache(self, cache: ArrayCache) -> Self {
+        Self { cache: Some(cache), ..self }
     }
 
     /// The same with the cache in `folder`, of at most `limit` bytes; without one, and with a warning, if it cannot be used.
@@ -73,15 +70,15 @@ impl Preprocessor {
 
     /// The cache.
     pub fn cache(&self) -> Option<&ArrayCache> {
-        self.cache.as_ref().map(|cache| &cache.arrays)
+        self.cache.as_ref()
     }
 
     /// Stores something, unless that failed before. A cache only saves time: what cannot be stored is a warning, the first time.
     pub fn store(&self, put: impl FnOnce(&ArrayCache) -> Result<(), CacheError>) {
-        let Some(cache) = self.cache.as_ref().filter(|cache| cache.failure.get().is_none()) else { return };
-        if let Err(error) = put(&cache.arrays) {
+        let Some(cache) = self.cache().filter(|_| self.failure.get().is_none()) else { return };
+        if let Err(error) = put(cache) {
             let warning = format!("{error}; nothing more is stored");
-            if cache.failure.set(error).is_ok() {
+            if self.failure.set(error).is_ok() {
                 tracing::warn!("{warning}");
             }
         }
@@ -89,7 +86,7 @@ impl Preprocessor {
 
     /// Why nothing more is stored, if so.
     pub fn store_failure(&self) -> Option<&CacheError> {
-        self.cache.as_ref()?.failure.get()
+        self.failure.get()
     }
 
     /// The binding of a garment whose rest mesh has the key `mesh`: from the cache, or computed and stored there.
@@ -103,10 +100,8 @@ impl Preprocessor {
     /// The largest skin weight of every joint; the binding comes from the cache, or is computed and stored there.
     pub fn largest_weights(&self, garment: &Garment, mesh: Key) -> Vec<f32> {
         let joints = self.body.joint_count();
-        let stored = self.cache.as_ref().and_then(|cache| {
-            get_largest_weights(&cache.arrays, self.binding_key(cache, mesh, garment.category))
-        });
-        match stored {
+        let key = self.binding_key(mesh, garment.category);
+        match self.cache().and_then(|cache| get_largest_weights(cache, key)) {
             Some(largest) if largest.len() == joints => largest,
             _ => self.compute_binding(garment, mesh).largest_weights(joints),
         }
@@ -114,22 +109,18 @@ impl Preprocessor {
 
     fn compute_binding(&self, garment: &Garment, mesh: Key) -> Binding {
         let binding = Binding::new(garment, &self.body, &self.binding);
-        if let Some(cache) = &self.cache {
-            let key = self.binding_key(cache, mesh, garment.category);
-            let joints = self.body.joint_count();
-            self.store(|arrays| put_binding(arrays, key, &garment.rest, &binding, joints));
-        }
+        let (key, joints) = (self.binding_key(mesh, garment.category), self.body.joint_count());
+        self.store(|cache| put_binding(cache, key, &garment.rest, &binding, joints));
         binding
     }
 
     /// The rest mesh and the binding that the cache has of it.
     pub fn stored_binding(&self, mesh: Key, category: Category) -> Option<(TriMesh, Binding)> {
-        let cache = self.cache.as_ref()?;
-        get_binding(&cache.arrays, self.binding_key(cache, mesh, category), self.body.joint_count())
+        get_binding(self.cache()?, self.binding_key(mesh, category), self.body.joint_count())
     }
 
-    fn binding_key(&self, cache: &GarmentCache, mesh: Key, category: Category) -> Key {
-        binding_key(mesh, cache.body, category, &self.binding)
+    fn binding_key(&self, mesh: Key, category: Category) -> Key {
+        binding_key(mesh, self.body_key, category, &self.binding)
     }
 
     /// DiffusionNet's operators of a rest mesh of key `mesh`: from the cache, or computed and stored there.
