@@ -73,16 +73,12 @@ impl PoseLibrary {
             Frames::split(&clips, config, folder)
         };
         let limit = config.max_self_intersection;
-        let filter = |body: &Arc<Body>| SelfIntersectionFilter {
-            body: body.clone(),
-            contact: SelfContact::new(body),
-            limit,
-        };
+        let filter = || SelfIntersectionFilter { body: body.clone(), contact: SelfContact::new(body), limit };
         let draw = PoseDraw {
             frames: config.motions.as_deref().map(split).transpose()?,
             sampler: PoseSampler::default(),
             augmentation: config.augmentation.then(PoseAugmentation::default),
-            filter: (limit < NO_FILTER).then(|| filter(body)),
+            filter: (limit < NO_FILTER).then(filter),
             remove_heading: config.remove_heading,
         };
         let self_intersecting = survey_self_intersections(&draw);
@@ -102,11 +98,6 @@ impl PoseLibrary {
     #[must_use]
     pub fn with_bank(self, config: &Config) -> Self {
         Self { bank: Bank::new(config), ..self }
-    }
-
-    /// Whether training poses come from a bank.
-    pub fn has_bank(&self) -> bool {
-        self.bank.is_some()
     }
 
     /// Makes the bank of training poses, or reads it from the cache; nothing without one.

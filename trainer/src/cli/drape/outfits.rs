@@ -61,22 +61,19 @@ pub(super) fn read(
             _ => path.to_owned(),
         };
         let mut own = scene.clone();
+        if entry.pose.is_some() && entry.motion.is_some() {
+            return Err(wrong("both pose and motion".to_owned()));
+        }
         if entry.pose.is_some() || entry.motion.is_some() {
             (own.posed, own.t_pose) = (None, None);
+            own.pose = entry.pose.map(|pose| pose_beside(&pose, beside));
+            own.motion = entry.motion.map(|motion| beside(&motion.display().to_string()).into());
         }
         if let Some(shape) = entry.shape {
             if own.t_pose.is_some() {
                 return Err(wrong("a shape beside --t-pose, which has its own".to_owned()));
             }
             own.shape = shape;
-        }
-        match (entry.pose, entry.motion) {
-            (Some(_), Some(_)) => return Err(wrong("both pose and motion".to_owned())),
-            (Some(pose), None) => (own.pose, own.motion) = (Some(pose_beside(&pose, beside)), None),
-            (None, Some(motion)) => {
-                (own.pose, own.motion) = (None, Some(beside(&motion.display().to_string()).into()));
-            }
-            (None, None) => {}
         }
         let named_frames = entry.frames.is_some() || entry.every.is_some();
         if let Some(frames) = entry.frames {

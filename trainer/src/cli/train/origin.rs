@@ -4,7 +4,7 @@ use crate::cli::data_check::check_data;
 use crate::cli::loading::load_dataset_for;
 use crate::config::Config;
 use crate::dataset::{DataCheck, Dataset};
-use crate::run::checkpoint::{Checkpoint, CheckpointError, CheckpointState, TrainedModel};
+use crate::run::checkpoint::{Checkpoint, CheckpointError, TrainedModel};
 use crate::run::difference::AllowedChanges;
 use crate::run::folder::{RunDir, RunDirError};
 use crate::training::process_group::ProcessGroup;
@@ -66,12 +66,12 @@ impl RunOrigin {
 
     /// Names of the joints that the networks see, where they are given.
     fn joints(&self) -> Option<&[String]> {
-        let of = |state: &CheckpointState| state.joints.len();
-        match self {
-            Self::New(Some(model)) if of(&model.state) > 0 => Some(&model.state.joints),
-            Self::Resumed(_, Some(checkpoint)) if of(&checkpoint.state) > 0 => Some(&checkpoint.state.joints),
-            _ => None,
-        }
+        let state = match self {
+            Self::New(Some(model)) => &model.state,
+            Self::Resumed(_, Some(checkpoint)) => &checkpoint.state,
+            _ => return None,
+        };
+        (!state.joints.is_empty()).then_some(&state.joints)
     }
 
     /// Checks and loads the data of `config`. Data that a checkpoint was made with was checked when its run began.

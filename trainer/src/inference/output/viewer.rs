@@ -43,16 +43,15 @@ fn page(show: &Show) -> Result<String, Report> {
     let stages = stages(show)?;
     let mut binary = Vec::new();
     let body = &show.draper.body().faces;
-    let still = |stage: &Stage| vec![0u8; 2 * stage.body.len()];
-    let mut meshes =
-        vec![pack(&mut binary, json!({ "name": "body", "colour": BODY_COLOUR, "layer": -1 }), body, |s| {
-            stages.iter().map(|stage| (stage.body, still(stage))).for_each(s)
-        })];
+    let still = vec![0; 2 * show.drapes[0].body.len()];
+    let of_body: Vec<_> = stages.iter().map(|stage| (stage.body, &still[..])).collect();
+    let about = json!({ "name": "body", "colour": BODY_COLOUR, "layer": -1 });
+    let mut meshes = vec![pack(&mut binary, about, body, &of_body)];
     for (layer, garment) in show.outfit.garments.iter().enumerate() {
         let about = json!({ "name": garment.name, "colour": layer_colour(layer), "layer": layer });
-        meshes.push(pack(&mut binary, about, garment.prepared.garment.rest.faces(), |s| {
-            stages.iter().map(|stage| (stage.garments[layer], stage.heat[layer].clone())).for_each(s)
-        }));
+        let frames: Vec<_> =
+            stages.iter().map(|stage| (stage.garments[layer], &stage.heat[layer][..])).collect();
+        meshes.push(pack(&mut binary, about, garment.prepared.garment.rest.faces(), &frames));
     }
     let moves = !show.bodies.moments.is_empty();
     let scene = json!({
@@ -182,24 +181,21 @@ fn gap_byte(millimetres: f64) -> u8 {
     1 + (254.0 * share).round() as u8
 }
 
-/// Appends a mesh to `binary` and completes what is said `about` it. `frames` hands every frame's positions and heat to its
-/// argument, in order.
-fn pack<'a>(
+/// Appends a mesh with the positions and heat of its `frames` to `binary`, and completes what is said `about` it.
+fn pack(
     binary: &mut Vec<u8>,
     mut about: Value,
     faces: &[[u32; 3]],
-    frames: impl Fn(&mut dyn FnMut((&'a [[f64; 3]], Vec<u8>))),
+    frames: &[(&[[f64; 3]], &[u8])],
 ) -> Value {
-    let (mut low, mut high, mut vertices) = ([f64::MAX; 3], [f64::MIN; 3], 0);
-    frames(&mut |(positions, _)| {
-        vertices = positions.len();
-        for p in positions {
-            for a in 0..3 {
-                low[a] = low[a].min(p[a]);
-                high[a] = high[a].max(p[a]);
-            }
+    let positions = || frames.iter().flat_map(|(positions, _)| *positions);
+    let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
+    for p in positions() {
+        for a in 0..3 {
+            low[a] = low[a].min(p[a]);
+            high[a] = high[a].max(p[a]);
         }
-    });
+    }
     let step: [f64; 3] = std::array::from_fn(|a| ((high[a] - low[a]) / 65535.0).max(1e-9));
     let start = |binary: &mut Vec<u8>| {
         binary.resize(binary.len().next_multiple_of(4), 0);
@@ -208,17 +204,15 @@ fn pack<'a>(
     about["faces"] = json!(start(binary));
     binary.extend(faces.as_flattened().iter().flat_map(|v| v.to_le_bytes()));
     about["positions"] = json!(start(binary));
-    frames(&mut |(positions, _)| {
-        for p in positions {
-            for a in 0..3 {
-                let packed = ((p[a] - low[a]) / step[a]).round().clamp(0.0, 65535.0) as u16;
-                binary.extend_from_slice(&packed.to_le_bytes());
-            }
+    for p in positions() {
+        for a in 0..3 {
+            let packed = ((p[a] - low[a]) / step[a]).round().clamp(0.0, 65535.0) as u16;
+            binary.extend_from_slice(&packed.to_le_bytes());
         }
-    });
+    }
     about["heat"] = json!(start(binary));
-    frames(&mut |(_, heat)| binary.extend_from_slice(&heat));
-    about["vertices"] = json!(vertices);
+    frames.iter().for_each(|(_, heat)| binary.extend_from_slice(heat));
+    about["vertices"] = json!(frames.first().map_or(0, |(positions, _)| positions.len()));
     about["triangles"] = json!(faces.len());
     about["low"] = json!(low);
     about["step"] = json!(step);
@@ -233,9 +227,8 @@ mod tests {
     fn packed_positions_are_within_half_a_step_and_aligned() {
         let frames = [[[0.1, -0.5, 2.0], [0.7, 0.5, 2.0]], [[0.3, 0.0, 2.0], [-0.2, 0.25, 2.0]]];
         let mut binary = vec![7u8; 5];
-        let about = pack(&mut binary, json!({ "name": "tee" }), &[[0, 1, 1]], |each| {
-            frames.iter().for_each(|f| each((f.as_slice(), vec![9; 4])))
-        });
+        let given = frames.each_ref().map(|positions| (positions.as_slice(), [9; 4].as_slice()));
+        let about = pack(&mut binary, json!({ "name": "tee" }), &[[0, 1, 1]], &given);
         let at = |key: &str| about[key].as_u64().unwrap() as usize;
         assert_eq!((at("vertices"), at("triangles"), at("faces") % 4, at("positions") % 4), (2, 1, 0, 0));
         for (i, value) in frames.as_flattened().as_flattened().iter().enumerate() {
