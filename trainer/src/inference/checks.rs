@@ -1,6 +1,6 @@
 //! Garments and bodies are checked before anything is draped; what is unusual about them is logged.
 
-use super::bodies::{Bodies, BodyState};
+use super::bodies::{Bodies, BodyState, check_body_mesh};
 use super::draper::Draper;
 use super::embedded::MAX_GARMENT_VERTICES;
 use super::source::GivenGarment;
@@ -36,7 +36,7 @@ impl Draper {
         // The frames of a motion are alike in what may be wrong with them.
         if let Some(state) = bodies.states.first() {
             self.posed(state)?;
-            state.surface.as_deref().map_or(Ok(()), |given| self.check_surface(given))?;
+            state.surface.as_deref().map_or(Ok(()), |given| check_body_mesh(self.body(), of, given))?;
         }
         let [low, high] = self.trained.config.data.shape_range;
         if let Some(value) = bodies.report.shape.iter().find(|value| !(low..=high).contains(*value)) {
@@ -69,19 +69,6 @@ impl Draper {
         check_finite("pose", body.pose.rotations.as_flattened().iter().chain(&body.place))?;
         let posed = self.body().posed(&shape, &body.pose).into_diagnostic()?;
         Ok((shape, posed))
-    }
-
-    /// Whether a posed surface is one of the body model's.
-    pub(super) fn check_surface(&self, surface: &[[f64; 3]]) -> Result<(), Report> {
-        let (found, expected) = (surface.len(), self.body().vertex_count());
-        if found != expected {
-            return Err(miette!(
-                help = "a posed mesh must have the vertices of the body model, in its order",
-                "the posed body has {found} vertices, body '{}' has {expected}",
-                self.body().name
-            ));
-        }
-        check_finite("posed body", surface.as_flattened())
     }
 
     /// Logs which garments are not made of what the model was trained on.

@@ -1,6 +1,6 @@
 //! An outfit on one body, skinned and draped by the networks, brought to where the body stands.
 
-use super::bodies::BodyState;
+use super::bodies::{BodyState, check_body_mesh};
 use super::drape::round;
 use super::draper::Draper;
 use super::networks::drape_on;
@@ -73,7 +73,7 @@ impl Draper {
         let (shape, posed) = self.posed(body)?;
         let mut surface = match &body.surface {
             Some(given) => {
-                self.check_surface(given)?;
+                check_body_mesh(self.body(), "the posed body", given)?;
                 given.clone()
             }
             None => posed.positions.iter().map(|p| add(*p, body.place)).collect(),
