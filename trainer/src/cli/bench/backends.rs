@@ -6,12 +6,11 @@ use crate::cli::table::{markdown, row};
 use crate::cli::values::{measuring_seconds, not_negative};
 use crate::cli::verbosity::print_status;
 use crate::system::device::{DeviceChoice, DeviceError};
-use crate::training::measure::{BenchmarkRun, Case, NETWORKS};
+use crate::training::measure::{BenchmarkRun, Case};
 use burn::tensor::Device;
 use clap::Parser;
 use miette::{Report, miette};
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// Whether all compute devices of this build agree on loss and gradients, and how fast they are
 #[derive(Parser)]
@@ -58,8 +57,6 @@ struct DeviceCosts {
     loss_difference: f64,
     /// Largest difference of a coordinate of a draped vertex, posed or canonical (m).
     position_difference_m: f64,
-    /// Relative differences of the gradients of every network, of all its parameters together; null where there is none.
-    gradient_differences: BTreeMap<&'static str, Option<f64>>,
     /// Largest relative difference over single parameters, and whose it is.
     gradient_difference: f64,
     parameter: String,
@@ -103,10 +100,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             loss: found_loss,
             loss_difference: ((found_loss - loss) / loss).abs(),
             position_difference_m: largest_distance(&found_positions, &positions),
-            gradient_differences: NETWORKS
-                .into_iter()
-                .map(|network| (network, network_difference(network, &found, &gradients)))
-                .collect(),
             gradient_difference: worst.as_ref().map_or(0.0, |worst| worst.0),
             parameter: worst.map(|worst| worst.1.clone()).unwrap_or_default(),
             forward_ms: costs.forward_ms,
@@ -148,20 +141,6 @@ fn largest_distance(found: &[Vec<[f32; 3]>; 2], expected: &[Vec<[f32; 3]>; 2]) -
     coordinates
         .map(|(a, b)| f64::from((a - b).abs()))
         .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a })
-}
-
-/// The [`difference`] over all parameters of a network; `None` where it has no gradient.
-fn network_difference(
-    network: &str,
-    found: &[(String, Vec<f32>)],
-    expected: &[(String, Vec<f32>)],
-) -> Option<f64> {
-    let join = |gradients: &[(String, Vec<f32>)]| -> Vec<f32> {
-        let of_network = gradients.iter().filter(|(name, _)| name.split('.').next() == Some(network));
-        of_network.flat_map(|(_, values)| values.iter().copied()).collect()
-    };
-    let expected = join(expected);
-    (!expected.is_empty()).then(|| difference(&join(found), &expected))
 }
 
 /// Norm of the difference over the norm of `expected`; infinite where the sizes differ.
