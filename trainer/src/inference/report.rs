@@ -213,17 +213,10 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<DrapedGarmentReport
             ..PhaseTimes::default()
         };
         for drape in drapes {
-            let shared = drape.milliseconds;
             let own: f64 = drape.garments.iter().map(|g| g.resolve_ms).sum();
-            times += PhaseTimes {
-                posing: share * shared.posing,
-                networks: share * shared.networks,
-                acceptance: share * shared.acceptance,
-                refine: share * shared.refine,
-                resolve: drape.garments[index].resolve_ms + share * (shared.resolve - own),
-                certificate: share * shared.certificate,
-                ..PhaseTimes::default()
-            };
+            let shared = PhaseTimes { resolve: drape.milliseconds.resolve - own, ..drape.milliseconds };
+            times += shared.scaled(share);
+            times.resolve += drape.garments[index].resolve_ms;
         }
         DrapedGarmentReport {
             name: garment.name.clone(),
