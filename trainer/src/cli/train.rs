@@ -24,7 +24,7 @@ use crate::training::session::Session;
 use crate::training::train_loop::train;
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
-use origin::{Loaded, RunOrigin};
+use origin::RunOrigin;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -150,7 +150,7 @@ fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
     let resume = arguments.resume.as_ref().map(Option::as_deref);
     let origin = RunOrigin::find(resume, &arguments.allow_config_change, &root, &config, group)?;
     let device = arguments.device.open()?;
-    let Loaded { dataset, check } = origin.load_data(&config, group)?;
+    let (dataset, check) = origin.load_data(&config, group)?;
     print_data(&dataset);
     make_pose_bank(&dataset.poses);
     let (run, mut session) = origin.begin(&root, &config, &dataset, &device, group)?;

@@ -23,13 +23,6 @@ pub(super) enum RunOrigin {
     Resumed(RunDir, Option<Box<Checkpoint>>),
 }
 
-/// The data of a run.
-pub(super) struct Loaded {
-    pub dataset: Arc<Dataset>,
-    /// What its files look like; `None` where they are those of the checkpoint.
-    pub check: Option<DataCheck>,
-}
-
 impl RunOrigin {
     /// What the run in `root` begins with. `resume` goes on with it, from the checkpoint there if one is named; the values of the
     /// keys `allowed` may differ then.
@@ -74,20 +67,26 @@ impl RunOrigin {
         (!state.joints.is_empty()).then_some(&state.joints)
     }
 
-    /// Checks and loads the data of `config`. Data that a checkpoint was made with was checked when its run began.
+    /// Loads the data of `config`, and says what its files look like: nothing where they are those of the checkpoint, which were
+    /// checked when its run began.
     ///
     /// # Errors
     /// When it cannot be read or trained on; each garment, clip or body at fault is named.
-    pub fn load_data(&self, config: &Config, group: &ProcessGroup) -> Result<Loaded, Report> {
+    pub fn load_data(
+        &self,
+        config: &Config,
+        group: &ProcessGroup,
+    ) -> Result<(Arc<Dataset>, Option<DataCheck>), Report> {
         // One process tells; the others fail with it.
         let check = || group.is_rank_zero().then(|| check_data(config)).transpose();
         let Self::Resumed(_, Some(checkpoint)) = self else {
             let check = check()?;
-            return Ok(Loaded { dataset: load_dataset_for(config, self.joints())?, check });
+            return Ok((load_dataset_for(config, self.joints())?, check));
         };
         let dataset = load_dataset_for(config, self.joints())?;
         let is_same = checkpoint.state.data.as_deref() == Some(dataset.fingerprint());
-        Ok(Loaded { check: if is_same { None } else { check()? }, dataset })
+        let check = if is_same { None } else { check()? };
+        Ok((dataset, check))
     }
 
     /// Makes the session and, when nothing can be wrong any more, the folder of a new run.
