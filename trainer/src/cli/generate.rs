@@ -14,7 +14,7 @@ use clothcombo_data::format::obj;
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use rayon::prelude::*;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
@@ -189,14 +189,11 @@ impl<'a> GarmentMaker<'a> {
 
     /// The first garments of each category.
     fn for_picture(&self, wanted: &[WantedFile]) -> Result<Vec<Garment>, Report> {
-        let mut counts = HashMap::new();
-        let is_shown = |garment: &&WantedFile| {
-            let count: &mut usize = counts.entry(garment.category).or_default();
-            let is_shown = *count < PER_CATEGORY && garment.path.exists();
-            *count += usize::from(is_shown);
-            is_shown
+        let of = |category| {
+            let all = wanted.iter().filter(move |garment| garment.category == category);
+            all.filter(|garment| garment.path.exists()).take(PER_CATEGORY)
         };
-        wanted.iter().filter(is_shown).map(|garment| self.load(garment)).collect()
+        Category::ALL.into_iter().flat_map(of).map(|garment| self.load(garment)).collect()
     }
 }
 
