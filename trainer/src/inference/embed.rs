@@ -2,8 +2,8 @@
 //! machine with a cache.
 
 use super::draper::Draper;
-use super::embedded::{EmbeddedGarment, GarmentTimes};
-use super::phase_times::elapsed;
+use super::embedded::EmbeddedGarment;
+use super::phase_times::{PhaseTimes, elapsed};
 use super::source::GivenGarment;
 use super::tensor_store::garment_tensors;
 use burn::tensor::{Tensor, TensorData};
@@ -37,7 +37,7 @@ impl Draper {
         let preparation = elapsed(clock);
         let clock = Instant::now();
         let (embedding, was_known) = self.embedding(&tensors, mesh);
-        let milliseconds = GarmentTimes { preparation, embedding: elapsed(clock) };
+        let milliseconds = PhaseTimes { preparation, embedding: elapsed(clock), ..PhaseTimes::default() };
         let found = EmbeddedGarment { prepared, rest, tensors, embedding, was_known, milliseconds };
         self.embedded.insert(key, found.clone());
         Ok(found)

@@ -1,5 +1,6 @@
 //! Garments with their embeddings, as many as memory is set apart for: those met last.
 
+use super::phase_times::PhaseTimes;
 use crate::dataset::PreparedGarment;
 use crate::system::lru_cache::{KeptBytes, LruCache, MemoryBudget, Residence};
 use clothcombo_data::cache::Key;
@@ -13,15 +14,6 @@ pub const MAX_GARMENT_VERTICES: usize = 100_000;
 /// Memory of a vertex of a garment at the paper's sizes (bytes): 2 kB are operators, as much the embedding.
 const BYTES_PER_VERTEX: usize = 4096;
 
-/// Wall time of what depends on the garment alone (ms).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct GarmentTimes {
-    /// Binding to the body, constants of the energies, operators.
-    pub preparation: f64,
-    /// The embedding network, or reading what it made before.
-    pub embedding: f64,
-}
-
 /// A garment with its tensors.
 #[derive(Clone)]
 pub(super) struct EmbeddedGarment {
@@ -32,7 +24,7 @@ pub(super) struct EmbeddedGarment {
     /// Whether the embedding was there already, in memory or in the cache.
     pub was_known: bool,
     /// What it cost this time.
-    pub milliseconds: GarmentTimes,
+    pub milliseconds: PhaseTimes,
 }
 
 /// The garments a draper has met last, by content: as many as two of the largest.
@@ -60,7 +52,7 @@ impl EmbeddedGarments {
     /// The garment of this key, at no cost, if it was met lately.
     pub fn get(&self, key: Key) -> Option<EmbeddedGarment> {
         let found = self.kept.get(self.place(key))?;
-        Some(EmbeddedGarment { was_known: true, milliseconds: GarmentTimes::default(), ..(*found).clone() })
+        Some(EmbeddedGarment { was_known: true, milliseconds: PhaseTimes::default(), ..(*found).clone() })
     }
 
     /// Keeps a garment.

@@ -2,8 +2,8 @@
 
 use super::checks::check_sizes;
 use super::draper::Draper;
-use super::embedded::GarmentTimes;
 use super::names::UniqueNames;
+use super::phase_times::PhaseTimes;
 use super::source::GivenGarment;
 use crate::dataset::{Arrangement, PreparedGarment};
 use clothcombo_model::{Embeddings, Mode, OutfitTensors};
@@ -24,8 +24,8 @@ pub struct OutfitGarment {
     pub rest: Arc<RestGarment>,
     /// Whether the embedding was there already, in memory or in the cache.
     pub embedding_known: bool,
-    /// What it cost this time.
-    pub milliseconds: GarmentTimes,
+    /// What preparing and embedding it cost this time.
+    pub milliseconds: PhaseTimes,
 }
 
 /// Garments that are draped together, innermost first, with everything that does not depend on the body.

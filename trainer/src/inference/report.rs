@@ -131,10 +131,7 @@ impl DrapeReport {
         let (first, moments) = (&drapes[0], &bodies.moments);
         let mut milliseconds = PhaseTimes::default();
         drapes.iter().for_each(|drape| milliseconds += drape.milliseconds);
-        for garment in &outfit.garments {
-            milliseconds.preparation += garment.milliseconds.preparation;
-            milliseconds.embedding += garment.milliseconds.embedding;
-        }
+        outfit.garments.iter().for_each(|garment| milliseconds += garment.milliseconds);
         let (certificate_before, (before, after)) = rayon::join(
             || first.certificate_before(draper, outfit),
             || {
@@ -207,11 +204,7 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<DrapedGarmentReport
     let report = |(index, garment): (usize, &OutfitGarment)| {
         let vertices = garment.prepared.vertex_count();
         let share = vertices as f64 / all.max(1) as f64;
-        let mut times = PhaseTimes {
-            preparation: garment.milliseconds.preparation,
-            embedding: garment.milliseconds.embedding,
-            ..PhaseTimes::default()
-        };
+        let mut times = garment.milliseconds;
         for drape in drapes {
             let own: f64 = drape.garments.iter().map(|g| g.resolve_ms).sum();
             let shared = PhaseTimes { resolve: drape.milliseconds.resolve - own, ..drape.milliseconds };
