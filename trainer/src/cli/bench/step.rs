@@ -127,7 +127,7 @@ fn synthetic(arguments: &Arguments, device: &Device) -> Result<Vec<CaseCosts>, R
         let name = [&[case.name()][..], arguments.overrides.as_slice()].concat().join(", ");
         measure(&mut run, name, Some(case), arguments)
     });
-    flattened(measured)
+    measured.filter_map(Result::transpose).collect()
 }
 
 /// Every combination of the sizes.
@@ -170,7 +170,7 @@ fn stages(arguments: &Arguments, config: Config, device: &Device) -> Result<Vec<
         let mut run = BenchmarkRun::new(config.clone(), dataset.clone(), index, device)?;
         measure(&mut run, names[index].clone(), None, arguments)
     };
-    flattened(chosen.into_iter().map(stage))
+    chosen.into_iter().map(stage).filter_map(Result::transpose).collect()
 }
 
 /// Nothing where a case is only exported.
@@ -199,12 +199,6 @@ fn measure(
         profile,
         costs,
     }))
-}
-
-fn flattened(
-    measured: impl Iterator<Item = Result<Option<CaseCosts>, Report>>,
-) -> Result<Vec<CaseCosts>, Report> {
-    measured.filter_map(Result::transpose).collect()
 }
 
 /// Three digits.
