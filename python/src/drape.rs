@@ -5,10 +5,8 @@ use crate::call::{call, refused_text};
 use clothcombo_physics::contact::resolve::Certificate;
 use clothcombo_trainer::inference::output::{Show, Staged, write};
 use clothcombo_trainer::inference::{
-    Bodies, Drape as FrameDrape, Draper, GarmentDrape, Outfit, OutfitGarment, Report as DrapeReport,
-    ScoredPositions, Smoothing,
+    Bodies, Drape as FrameDrape, DrapeReport, Draper, GarmentDrape, Outfit, OutfitGarment, Smoothing,
 };
-use miette::Report;
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -119,7 +117,7 @@ impl Drape {
     fn score<'py>(&self, py: Python<'py>, frame: usize) -> PyResult<Bound<'py, PyAny>> {
         let none = || refused_text(format!("no frame {frame} of {}", self.drapes.len()));
         let drape = self.drapes.get(frame).ok_or_else(none)?;
-        let score = call(py, &[], || drape.score(&self.draper, &self.outfit, ScoredPositions::Result))?;
+        let score = call(py, &[], || drape.score(&self.draper, &self.outfit, |garment| &garment.positions))?;
         from_json(py, &score)
     }
 
@@ -140,7 +138,7 @@ impl Drape {
             let smoothing = smoothing.as_ref();
             let show = Show { draper, outfit, bodies, drapes, smoothing, title: &title, all_frames };
             write(staged.folder(), &show)?;
-            Ok::<_, Report>(staged.commit()?)
+            staged.commit()
         })
     }
 }

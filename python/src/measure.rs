@@ -94,7 +94,7 @@ pub fn score<'py>(
             draped: triangles(draped)?,
             canonical: triangles(canonical)?,
         };
-        Ok::<_, Report>(score_meshes(meshes, distance)?)
+        score_meshes(meshes, distance)
     })?;
     from_json(py, &score)
 }

@@ -12,7 +12,7 @@ use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::mesh::MeshError;
 use clothcombo_trainer::inference::{
     Bodies, Draper, DraperSettings, FrameRange, GarmentCatalog, GivenGarment, MOST_RADIUS,
-    Outfit as PreparedOutfit, RefineSteps, log_repairs, warn_about_order,
+    Outfit as PreparedOutfit, RefineSteps,
 };
 use clothcombo_trainer::system::paths::user_cache;
 use miette::{IntoDiagnostic, Report};
@@ -168,10 +168,7 @@ impl Model {
         call(py, &files, || {
             let found = wanted.into_iter().map(|garment| garment.find(&self.catalog, &self.draper, fit));
             let sources = found.collect::<Result<Vec<_>, Report>>()?;
-            PreparedOutfit::check(&sources)?;
-            sources.iter().for_each(log_repairs);
-            self.draper.log_materials(&sources);
-            warn_about_order(&sources);
+            self.draper.check_garments(&sources)?;
             let outfit = Arc::new(self.draper.outfit(sources)?);
             Ok::<_, Report>(Outfit { draper: self.draper.clone(), outfit })
         })
@@ -214,7 +211,10 @@ impl Outfit {
     ) -> PyResult<Drape> {
         let refine = match refine {
             None => None,
-            Some(RefineInput::Steps(steps)) => Some(RefineSteps::AtMost(steps)),
+            Some(RefineInput::Steps(steps)) => {
+                let wrong = |what| refused_text(format!("refine is {steps}; hint: {what}"));
+                Some(RefineSteps::at_most(steps).map_err(wrong)?)
+            }
             Some(RefineInput::Text(text)) => {
                 Some(text.parse().map_err(|what| refused_text(format!("refine is {text:?}; hint: {what}")))?)
             }
@@ -256,7 +256,7 @@ impl Outfit {
                     Bodies::in_pose(body, &shape, pose, &name)
                 }
             };
-            bodies.check(&draper)?;
+            draper.check_bodies(&bodies)?;
             let outfit = self.outfit.clone();
             let (drapes, smoothing) = draper.drape_bodies(&outfit, &bodies, smooth, |_| ())?;
             Ok::<_, Report>(Drape { draper, outfit, drapes, bodies, smoothing })

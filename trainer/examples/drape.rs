@@ -7,7 +7,7 @@
 use clothcombo_data::asset::Pose;
 use clothcombo_data::fit::FitSettings;
 use clothcombo_trainer::cli;
-use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings, ScoredPositions};
+use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings};
 use miette::{Report, miette};
 use std::path::PathBuf;
 
@@ -35,7 +35,7 @@ fn run() -> Result<(), Report> {
     arms_lowered.rotations[17] = [0.0, 0.0, 1.0];
     for shape in [-1.5, 0.0, 1.5] {
         let drape = draper.drape(&outfit, &BodyState::new(vec![shape], arms_lowered.clone()))?;
-        let score = drape.score(&draper, &outfit, ScoredPositions::Result)?;
+        let score = drape.score(&draper, &outfit, |garment| &garment.positions)?;
         for (garment, scored) in outfit.garments.iter().zip(&score.garments) {
             println!(
                 "shape {shape:>4}: {} has {:.2} % of {} vertices inside the body",

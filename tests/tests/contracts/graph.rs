@@ -1,9 +1,9 @@
 //! `model.graph`: what the untangling network does to a single garment, in training and at inference.
 
 use burn::module::Module;
+use clothcombo_model::Mode;
 use clothcombo_tests::Untrained;
 use clothcombo_trainer::config::Trains;
-use clothcombo_trainer::inference::layer_interaction::LayerInteraction;
 use clothcombo_trainer::inference::networks::Networks;
 
 /// Whether D_m moves a single garment, and whether the gradient of its loss trains D_m.
@@ -14,8 +14,8 @@ fn acts_on_a_single_garment(graph: &str) -> (bool, bool) {
     assert_eq!((scene[0].garments.len(), scene[0].contacts.len()), (1, 0));
 
     let networks = Networks::new(run.model.valid(), &run.tensors);
-    let interactions = [LayerInteraction::Together, LayerInteraction::SingleGarments];
-    let [drape, single] = interactions.map(|interaction| networks.forward(&scene[0], interaction).unwrap());
+    let modes = [Mode::Layered, Mode::Single];
+    let [drape, single] = modes.map(|mode| networks.forward(&scene[0], mode).unwrap());
     let (_, gradient) = run.loss_and_gradient(scene, Trains::Untangling);
     (drape.canonical != single.canonical, gradient.iter().any(|g| *g != 0.0))
 }

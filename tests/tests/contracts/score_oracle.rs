@@ -7,7 +7,7 @@ use clothcombo_physics::energy::{
 };
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::query::Surface;
-use clothcombo_trainer::score::{MeshFiles, ScoreDistance, score_files};
+use clothcombo_trainer::score::{NamedMesh, SceneMeshes, ScoreDistance, score_meshes};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -115,11 +115,11 @@ fn all_eight_energies_equal_the_oracle() {
 fn the_score_equals_the_oracle() {
     for name in ["outfit", "hard"] {
         let golden = Golden::open(name);
-        let (body, rest, draped) =
-            (golden.folder.join("body.obj"), golden.files("rest"), golden.files("draped"));
-        let canonical = golden.files("canonical");
-        let files = MeshFiles { body: &body, rest: &rest, draped: &draped, canonical: &canonical };
-        let score = score_files(&files, ScoreDistance::NearestVertex).unwrap();
+        let load = |kind| golden.files(kind).iter().map(|path| NamedMesh::load(path).unwrap()).collect();
+        let body = NamedMesh::load_body(&golden.folder.join("body.obj")).unwrap();
+        let meshes =
+            SceneMeshes { body, rest: load("rest"), draped: load("draped"), canonical: load("canonical") };
+        let score = score_meshes(meshes, ScoreDistance::NearestVertex).unwrap();
         assert_eq!(score.garments.iter().map(|g| g.name.as_str()).collect::<Vec<_>>(), golden.names());
         for (garment, oracle) in score.garments.iter().zip(golden.oracle["garments"].as_array().unwrap()) {
             for (values, kind) in [(&garment.raw, "raw"), (&garment.weighted, "weighted")] {

@@ -4,7 +4,7 @@ use clothcombo_trainer::system::limits::{SystemMemory, report_limits};
 use std::process::ExitCode;
 
 #[global_allocator]
-static MEMORY: SystemMemory = SystemMemory;
+static ALLOCATOR: SystemMemory = SystemMemory;
 
 fn main() -> ExitCode {
     report_limits();

@@ -28,13 +28,13 @@ enum Verb {
     Check(cli::check::Arguments),
     Completions(cli::manual::Completions),
     #[command(subcommand)]
-    Config(cli::config::Verb),
+    Config(cli::config::ConfigVerb),
     Drape(Box<cli::drape::Arguments>),
     Eval(cli::eval::Arguments),
     Fit(cli::fit::Arguments),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
-    Import(cli::import::Source),
+    Import(cli::import::ImportSource),
     Manual(cli::manual::Manual),
     Prepare(cli::prepare::Arguments),
     Replay(cli::replay::Arguments),
@@ -44,7 +44,7 @@ enum Verb {
 }
 
 #[global_allocator]
-static MEMORY: SystemMemory = SystemMemory;
+static ALLOCATOR: SystemMemory = SystemMemory;
 
 fn main() -> ExitCode {
     report_limits();

@@ -33,7 +33,7 @@ pub struct Arguments {
 }
 
 #[derive(Serialize)]
-struct Output<'a> {
+struct CheckOutput<'a> {
     body: &'a str,
     unusable: usize,
     files: &'a [FileCheck],
@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let files: Vec<FileCheck> = targets.par_iter().map(check).collect();
     bar.finish_and_clear();
     let unusable: Vec<&str> = files.iter().filter_map(|f| f.unusable.as_deref()).collect();
-    let output = Output { body: &body_name, unusable: unusable.len(), files: &files };
+    let output = CheckOutput { body: &body_name, unusable: unusable.len(), files: &files };
     print_report(arguments.json, &output, text)?;
     match unusable.is_empty() {
         true => Ok(()),
@@ -72,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     }
 }
 
-fn text(output: &Output<'_>) -> String {
+fn text(output: &CheckOutput<'_>) -> String {
     let files = output.files;
     let name = |f: &FileCheck| f.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let garments: Vec<Row> =

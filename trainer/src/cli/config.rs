@@ -18,7 +18,7 @@ use std::path::PathBuf;
 
 /// What a configuration may say, and what one comes to
 #[derive(Subcommand)]
-pub enum Verb {
+pub enum ConfigVerb {
     /// Prints the JSON schema of a configuration: every key with meaning, type, unit and default
     Schema,
     /// Checks a configuration and prints the resolved plan: stages, schedules, weights, estimated time
@@ -63,10 +63,10 @@ pub struct CheckArguments {
 ///
 /// # Errors
 /// When the configuration or, for the time, its data cannot be used.
-pub fn run(verb: &Verb) -> Result<(), Report> {
+pub fn run(verb: &ConfigVerb) -> Result<(), Report> {
     match verb {
-        Verb::Schema => print_json(&schema()),
-        Verb::Check(arguments) => check(arguments),
+        ConfigVerb::Schema => print_json(&schema()),
+        ConfigVerb::Check(arguments) => check(arguments),
     }
 }
 

@@ -8,7 +8,7 @@ use crate::system::closed_pipe::print_stderr;
 use miette::{Report, miette};
 
 /// Most files that a table shows.
-const MOST: usize = 30;
+const MOST_FAULTS: usize = 30;
 
 /// Checks the files that `config` names; warnings are counted in one line.
 ///
@@ -32,11 +32,11 @@ pub(super) fn check_data(config: &Config) -> Result<DataCheck, Report> {
         }
         return Ok(check);
     }
-    let rows: Vec<Row> = check.faults.iter().take(MOST).map(fault_row).collect();
+    let rows: Vec<Row> = check.faults.iter().take(MOST_FAULTS).map(fault_row).collect();
     print_stderr(table(&rows).trim_end());
     let count = check.faults.len();
-    if count > MOST {
-        print_stderr(format_args!("… and {} more", count - MOST));
+    if count > MOST_FAULTS {
+        print_stderr(format_args!("… and {} more", count - MOST_FAULTS));
     }
     Err(miette!(
         help = "mend them, or take them out of the data; `clothcombo check FOLDER --body BODY` judges in the same way",

@@ -13,7 +13,6 @@ use crate::run::checkpoint::TrainedModel;
 use crate::run::report::html::utc;
 use crate::system::device::name;
 use crate::system::files::{check_writable, write_file, write_json};
-use crate::system::paths::obstacle;
 use burn::tensor::Device;
 use clap::Parser;
 use clap::builder::PossibleValuesParser;
@@ -44,7 +43,7 @@ pub struct Arguments {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Folder of the report; an earlier report in it is replaced
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", value_parser = folder_to_make())]
     output: PathBuf,
     /// A few scenes per part and no gallery: minutes instead of a quarter of an hour
     #[arg(long)]
@@ -79,9 +78,9 @@ fn named(text: &str) -> Result<(String, PathBuf), String> {
     }
 }
 
-/// Names of the files that make a report.
 /// Outfits of the part `certificates` where it is asked for without their number: a quarter of an hour.
 const OUTFITS: usize = 50;
+/// The files that make a report.
 const JSON: &str = "eval.json";
 const MARKDOWN: &str = "eval.md";
 const HTML: &str = "report.html";
@@ -140,13 +139,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
 
 /// Before anything is loaded: whether the report may be written where it is wanted.
 fn check_output(folder: &Path) -> Result<(), Report> {
-    if let Some(file) = obstacle(folder) {
-        return Err(miette!(
-            help = "choose another folder with -o",
-            "{} is a file, not a folder",
-            file.display()
-        ));
-    }
     let occupied = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     let read = |text: String| serde_json::from_str::<Value>(&text).ok();
     let earlier = fs::read_to_string(folder.join(JSON)).ok().and_then(read);

@@ -9,9 +9,9 @@ use image::RgbImage;
 /// Most garments of a category.
 pub const PER_CATEGORY: usize = 8;
 /// Garments in a row.
-const COLUMNS: usize = 8;
+const GARMENTS_IN_ROW: usize = 8;
 /// Sides of one picture (pixels).
-const CELL: [u32; 2] = [190, 200];
+const CELL_SIDES: [u32; 2] = [190, 200];
 
 /// Up to [`PER_CATEGORY`] garments of each category, seen from the front left.
 pub fn garment_sheet(body: &Body, garments: &[Garment]) -> RgbImage {
@@ -30,7 +30,7 @@ pub fn garment_sheet(body: &Body, garments: &[Garment]) -> RgbImage {
         let corners: Vec<[f64; 3]> =
             (0..8).map(|c| std::array::from_fn(|a| if c >> a & 1 == 0 { low[a] } else { high[a] })).collect();
         let frame = Figure { positions: &corners, faces: &[], colour: BODY_COLOUR };
-        let camera = Camera::framing(&[frame], View::ThreeQuarter, CELL);
+        let camera = Camera::framing(&[frame], View::ThreeQuarter, CELL_SIDES);
         cells.extend(of(category).map(|garment| {
             let figures = [
                 Figure { positions: &body.template, faces: &body.faces, colour: BODY_COLOUR },
@@ -40,10 +40,10 @@ pub fn garment_sheet(body: &Body, garments: &[Garment]) -> RgbImage {
                     colour: layer_colour(category as usize),
                 },
             ];
-            (category, render_with_camera(&figures, &camera, CELL))
+            (category, render_with_camera(&figures, &camera, CELL_SIDES))
         }));
     }
-    let rows = cells.chunks(COLUMNS).map(|row| {
+    let rows = cells.chunks(GARMENTS_IN_ROW).map(|row| {
         let mut names: Vec<String> =
             row.iter().map(|(category, _)| category.name().replace('_', " ")).collect();
         names.dedup();
@@ -70,9 +70,9 @@ mod tests {
             [Category::Trousers, Category::TShirt].map(|c| generator.generate(c, 3, &settings).unwrap());
         let [one, two] = [&garments[..1], &garments].map(|some| garment_sheet(&body, some).dimensions());
         assert_eq!((one.1, one.0 < two.0), (two.1, true));
-        assert!(garment_sheet(&body, &[]).width() < CELL[0]);
+        assert!(garment_sheet(&body, &[]).width() < CELL_SIDES[0]);
         // Nine are a whole row and one more.
         let nine: Vec<Garment> = garments.iter().cycle().take(9).cloned().collect();
-        assert!(garment_sheet(&body, &nine).height() >= 2 * CELL[1]);
+        assert!(garment_sheet(&body, &nine).height() >= 2 * CELL_SIDES[1]);
     }
 }

@@ -14,7 +14,7 @@ use clothcombo_data::format::obj;
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use rayon::prelude::*;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
@@ -61,8 +61,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let body = load_body(&arguments.body, 0)?;
     let maker = GarmentMaker::new(arguments, &body)?;
-    let wanted: Vec<WantedGarment> =
-        (0..arguments.count as u64).map(|i| maker.wanted(arguments, i)).collect();
+    let wanted: Vec<WantedFile> = (0..arguments.count as u64).map(|i| maker.wanted(arguments, i)).collect();
     let folder = &arguments.output;
     // Before anything is made: a folder that holds other garments stays as it is.
     wanted.iter().try_for_each(|garment| maker.check(garment))?;
@@ -117,7 +116,7 @@ enum Made {
     Failed(String),
 }
 
-struct WantedGarment {
+struct WantedFile {
     category: Category,
     seed: u64,
     path: PathBuf,
@@ -139,7 +138,7 @@ impl<'a> GarmentMaker<'a> {
     }
 
     /// Garment `i` of this run.
-    fn wanted(&self, arguments: &Arguments, i: u64) -> WantedGarment {
+    fn wanted(&self, arguments: &Arguments, i: u64) -> WantedFile {
         let categories = match &arguments.categories[..] {
             [] => &Category::ALL,
             some => some,
@@ -148,11 +147,11 @@ impl<'a> GarmentMaker<'a> {
         let category = categories[(index % categories.len() as u64) as usize];
         let seed = arguments.seed.wrapping_add(index);
         let path = self.folder.join(format!("{}.obj", GarmentGenerator::name(category, seed)));
-        WantedGarment { category, seed, path }
+        WantedFile { category, seed, path }
     }
 
     /// Refuses a folder in which another garment has the name of this one.
-    fn check(&self, WantedGarment { seed, path, .. }: &WantedGarment) -> Result<(), Report> {
+    fn check(&self, WantedFile { seed, path, .. }: &WantedFile) -> Result<(), Report> {
         match path.exists() {
             true => check_source(path, &self.generator.provenance(*seed, &self.settings).source),
             false => Ok(()),
@@ -160,8 +159,8 @@ impl<'a> GarmentMaker<'a> {
     }
 
     /// Makes a garment unless it exists.
-    fn make(&self, wanted: &WantedGarment, listed: &HashSet<String>) -> Result<Made, Report> {
-        let WantedGarment { category, seed, path } = wanted;
+    fn make(&self, wanted: &WantedFile, listed: &HashSet<String>) -> Result<Made, Report> {
+        let WantedFile { category, seed, path } = wanted;
         let in_folder = |garment| FolderGarment { garment, layer: None, path: PathBuf::new() };
         if path.exists() {
             let is_listed = path.file_name().is_some_and(|name| listed.contains(&*name.to_string_lossy()));
@@ -180,7 +179,7 @@ impl<'a> GarmentMaker<'a> {
     }
 
     /// Reads a garment that exists.
-    fn load(&self, WantedGarment { category, seed, path }: &WantedGarment) -> Result<Garment, Report> {
+    fn load(&self, WantedFile { category, seed, path }: &WantedFile) -> Result<Garment, Report> {
         let rest = obj::load(path).into_diagnostic()?;
         let name = GarmentGenerator::name(*category, *seed);
         let source = self.generator.provenance(*seed, &self.settings);
@@ -189,15 +188,12 @@ impl<'a> GarmentMaker<'a> {
     }
 
     /// The first garments of each category.
-    fn for_picture(&self, wanted: &[WantedGarment]) -> Result<Vec<Garment>, Report> {
-        let mut counts = HashMap::new();
-        let is_shown = |garment: &&WantedGarment| {
-            let count: &mut usize = counts.entry(garment.category).or_default();
-            let is_shown = *count < PER_CATEGORY && garment.path.exists();
-            *count += usize::from(is_shown);
-            is_shown
+    fn for_picture(&self, wanted: &[WantedFile]) -> Result<Vec<Garment>, Report> {
+        let of = |category| {
+            let all = wanted.iter().filter(move |garment| garment.category == category);
+            all.filter(|garment| garment.path.exists()).take(PER_CATEGORY)
         };
-        wanted.iter().filter(is_shown).map(|garment| self.load(garment)).collect()
+        Category::ALL.into_iter().flat_map(of).map(|garment| self.load(garment)).collect()
     }
 }
 

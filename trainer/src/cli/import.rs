@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 /// Converts bodies, garments and motions
 #[derive(Subcommand)]
-pub enum Source {
+pub enum ImportSource {
     /// Motion capture in BVH files
     #[command(
         after_help = "Example:\n  clothcombo import bvh 01_01.bvh 01_03.bvh --body datasets/open/body.npz -o datasets/open/motions\n\n\
@@ -253,7 +253,7 @@ pub struct DeepmimicArguments {
 ///
 /// # Errors
 /// When an input cannot be read or an output not be written; the message names the file.
-pub fn run(source: &Source) -> Result<(), Report> {
+pub fn run(source: &ImportSource) -> Result<(), Report> {
     let bar = progress_bar(0, "{msg} {bar:40} {pos}/{len}");
     let mut progress = |what: &str, done: usize, total: usize| {
         bar.set_length(total as u64);
@@ -261,27 +261,27 @@ pub fn run(source: &Source) -> Result<(), Report> {
         bar.set_message(what.to_owned());
     };
     let summary = match source {
-        Source::Bvh(BvhArguments { files, rig }) => {
+        ImportSource::Bvh(BvhArguments { files, rig }) => {
             let body = load_body(&rig.body, 0)?;
             let joints = rig.joints.as_deref();
             import_bvh(files, &body, &rig.output, &rig.settings(), joints, &mut progress).into_diagnostic()?
         }
-        Source::Amc(AmcArguments { inputs, skeleton, rate, rig }) => {
+        ImportSource::Amc(AmcArguments { inputs, skeleton, rate, rig }) => {
             let body = load_body(&rig.body, 0)?;
             let settings = AmcSettings { retarget: rig.settings(), rate: *rate, skeleton: skeleton.clone() };
             let joints = rig.joints.as_deref();
             import_amc(inputs, &body, &rig.output, &settings, joints, &mut progress).into_diagnostic()?
         }
-        Source::Smplx(a) => {
+        ImportSource::Smplx(a) => {
             let limit = if a.components == 0 { usize::MAX } else { a.components };
             let settings = BodyFileSettings { shape_components: limit };
             import_smpl_family(&a.input, &a.output, &settings, &mut progress).into_diagnostic()?
         }
-        Source::Amass(a) => {
+        ImportSource::Amass(a) => {
             let settings = AmassSettings { thinning: a.thinning.thinning(), up: a.up.axis(), rate: a.rate };
             import_amass(&a.inputs, &a.output, &settings, &mut progress).into_diagnostic()?
         }
-        Source::Cloth3d(a) => {
+        ImportSource::Cloth3d(a) => {
             let target = load_body(&a.body, 0)?;
             let gendered = |file: &Option<String>| -> Result<Option<Body>, Report> {
                 Ok(file.as_deref().map(|f| load_body(f, 0)).transpose()?)
@@ -300,7 +300,7 @@ pub fn run(source: &Source) -> Result<(), Report> {
             };
             import_cloth3d(&a.samples, &bodies, &a.output, &settings, &mut progress).into_diagnostic()?
         }
-        Source::Deepmimic(a) => {
+        ImportSource::Deepmimic(a) => {
             let body = load_body(&a.body, 0)?;
             let provenance = a.provenance.provenance();
             let body_file = Some(PathBuf::from(&a.body));

@@ -17,13 +17,11 @@ pub(super) fn under_preparation_bar<T>(prepare: impl FnOnce(&(dyn Fn(usize, usiz
 
 /// Makes the bank of training poses under a bar, if there is to be one.
 pub(super) fn make_pose_bank(poses: &PoseLibrary) {
-    if poses.has_bank() {
-        let bar = progress_bar(0, "making poses {bar:30} {pos}/{len}");
-        poses.make_bank(&|done, total| {
-            bar.set_length(total as u64);
-            bar.set_position(done as u64);
-        });
-    }
+    let bar = progress_bar(0, "making poses {bar:30} {pos}/{len}");
+    poses.make_bank(&|done, total| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    });
 }
 
 /// Loads the data of `config` under a bar.

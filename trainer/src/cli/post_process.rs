@@ -2,7 +2,7 @@
 
 use super::values::{gap_mm, seconds};
 use clap::Args;
-use clothcombo_physics::contact::resolve::{Certificate, ResolveSettings};
+use clothcombo_physics::contact::resolve::ResolveSettings;
 use std::time::Duration;
 
 /// What the post-process is to do.
@@ -24,13 +24,15 @@ impl PostProcessArguments {
     }
 }
 
-/// Says that the budget ended the post-process, if it did.
-pub fn stopped(certificate: &Certificate) -> Option<String> {
-    certificate.is_stopped.then(|| {
-        format!(
-            "stopped after its budget, {} pairs left; hint: a longer --time-limit if there is one, another order of the garments, \
-             fewer of them, or a pose in which the body overlaps itself less",
-            certificate.between()
-        )
-    })
+/// What to do about `pairs` that are left, or a budget that ended the post-process.
+pub fn left_over(pairs: usize, is_stopped: bool) -> Option<String> {
+    let (stopped, longer) = match (is_stopped, pairs) {
+        (false, 0) => return None,
+        (false, _) => ("", ""),
+        (true, _) => ("stopped after its budget, ", "a longer --time-limit if there is one, "),
+    };
+    Some(format!(
+        "{stopped}{pairs} pairs left, listed in report.json; hint: {longer}another order of the garments, fewer of them, or a pose \
+         in which the body overlaps itself less"
+    ))
 }

@@ -1,15 +1,13 @@
 //! `clothcombo resolve`: anyone's garments taken out of anyone's body, and out of each other.
 
 use crate::cli::output::print_report;
-use crate::cli::post_process::{PostProcessArguments, stopped};
+use crate::cli::post_process::{PostProcessArguments, left_over};
 use crate::cli::table::{row, table};
 use crate::cli::verbosity::spinner;
 use crate::inference::UniqueNames;
 use crate::inference::output::Staged;
 use crate::picture::{DressedRow, draw_dressed, save_png};
-use crate::score::{
-    DrapedGarment, NamedMesh, Score, ScoreDistance, ScoreError, checked_body, checked_garment, score,
-};
+use crate::score::{DrapedGarment, NamedMesh, Score, ScoreDistance, checked_body, checked_garment, score};
 use crate::system::paths::lossy;
 use clap::Parser;
 use clothcombo_data::format::obj::MovedObj;
@@ -90,14 +88,14 @@ struct ResolvedGarment {
 }
 
 /// A garment as read.
-struct Garment {
+struct ReadGarment {
     path: PathBuf,
     name: String,
     rest: TriMesh,
     draped: TriMesh,
 }
 
-impl Garment {
+impl ReadGarment {
     fn file(&self) -> String {
         format!("{}.obj", self.name)
     }
@@ -134,20 +132,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let certificate_before =
         spinner("counting intersections", || certify(&surface, &layers)).map_err(named)?;
     let resolved = spinner("resolving", || resolve(&surface, &layers, &settings)).map_err(named)?;
-    let scored = |positions: &dyn Fn(usize) -> Vec<[f64; 3]>| -> Result<Score, Report> {
-        let all: Vec<Vec<[f64; 3]>> = (0..garments.len()).map(positions).collect();
-        let draped: Vec<DrapedGarment> = garments
-            .iter()
-            .zip(&all)
-            .map(|(g, positions)| DrapedGarment { name: &g.name, rest: &g.rest, positions, canonical: None })
-            .collect();
-        Ok(score(&body, &draped, ScoreDistance::Surface)?)
+    let scored = |positions: Vec<&[[f64; 3]]>| {
+        let draped = |(g, positions)| {
+            let ReadGarment { name, rest, .. }: &ReadGarment = g;
+            DrapedGarment { name, rest, positions, canonical: None }
+        };
+        let draped: Vec<DrapedGarment> = garments.iter().zip(positions).map(draped).collect();
+        score(&body, &draped, ScoreDistance::Surface)
     };
     let ms = |time: Duration| 1e3 * time.as_secs_f64();
     let report = ResolveReport {
         gap_mm: arguments.post_process.gap_mm,
-        before: spinner("scoring", || scored(&|i| garments[i].draped.positions().to_vec()))?,
-        after: spinner("scoring", || scored(&|i| resolved.positions[i].clone()))?,
+        before: spinner("scoring", || scored(garments.iter().map(|g| g.draped.positions()).collect()))?,
+        after: spinner("scoring", || scored(resolved.positions.iter().map(Vec::as_slice).collect()))?,
         certificate_before,
         certificate: resolved.certificate.clone(),
         milliseconds: Milliseconds {
@@ -168,10 +165,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             .collect(),
     };
     spinner("writing", || write(staged, &body, &garments, &resolved, &report))?;
-    print_report(arguments.json, &report, text)
+    print_report(arguments.json, &report, |report| text(report, arguments.keep_self))
 }
 
-fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<Garment>, Report> {
+fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<ReadGarment>, Report> {
     let (draped, rest) = (&arguments.garments, &arguments.rest);
     if !rest.is_empty() && rest.len() != draped.len() {
         return Err(miette!(
@@ -181,13 +178,13 @@ fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<Garment>, 
             draped.len()
         ));
     }
-    let mut garments: Vec<Garment> = Vec::with_capacity(draped.len());
+    let mut garments: Vec<ReadGarment> = Vec::with_capacity(draped.len());
     let mut names = UniqueNames::default();
     for (i, path) in draped.iter().enumerate() {
         let (rest, draped) = (NamedMesh::load(rest.get(i).unwrap_or(path))?, NamedMesh::load(path)?);
         let name = checked_garment(&rest, &draped, body)?;
         // Two files of one name from two folders must not overwrite each other.
-        garments.push(Garment {
+        garments.push(ReadGarment {
             path: path.clone(),
             name: names.take(&name),
             rest: rest.mesh,
@@ -201,7 +198,7 @@ fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<Garment>, 
 fn write(
     staged: Staged,
     body: &TriMesh,
-    garments: &[Garment],
+    garments: &[ReadGarment],
     resolved: &Resolved,
     report: &ResolveReport,
 ) -> Result<(), Report> {
@@ -215,7 +212,7 @@ fn write(
     }
     save_pictures(folder, body, garments, resolved)?;
     fs::write(folder.join("report.json"), json).into_diagnostic().wrap_err_with(|| failed("report.json"))?;
-    Ok(staged.commit()?)
+    staged.commit()
 }
 
 /// Writes `picture.png`, before and after one below the other, and `layers.png`, after, each garment alone, where there is more
@@ -223,7 +220,7 @@ fn write(
 fn save_pictures(
     folder: &Path,
     body: &TriMesh,
-    garments: &[Garment],
+    garments: &[ReadGarment],
     resolved: &Resolved,
 ) -> Result<(), Report> {
     let rows = [
@@ -244,7 +241,7 @@ fn save_pictures(
 fn row<'a>(
     label: &str,
     body: &'a TriMesh,
-    garments: &'a [Garment],
+    garments: &'a [ReadGarment],
     positions: impl Iterator<Item = &'a [[f64; 3]]>,
 ) -> DressedRow<'a> {
     DressedRow {
@@ -257,7 +254,7 @@ fn row<'a>(
 }
 
 /// The garment's file with new positions; a file of another format becomes an OBJ of its polygons.
-fn moved(garment: &Garment, positions: &[[f64; 3]]) -> Result<MovedObj, Report> {
+fn moved(garment: &ReadGarment, positions: &[[f64; 3]]) -> Result<MovedObj, Report> {
     let path = &garment.path;
     let bytes = fs::read(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
     if MeshFormat::detect(path, &bytes) == Some(MeshFormat::Obj) {
@@ -268,7 +265,7 @@ fn moved(garment: &Garment, positions: &[[f64; 3]]) -> Result<MovedObj, Report> 
     for [x, y, z] in positions {
         let _ = writeln!(text, "v {x} {y} {z}");
     }
-    for polygon in load_mesh(path).map_err(ScoreError::from)?.polygons() {
+    for polygon in load_mesh(path).into_diagnostic()?.polygons() {
         text.push('f');
         polygon.iter().for_each(|v| {
             let _ = write!(text, " {}", u64::from(*v) + 1);
@@ -278,7 +275,7 @@ fn moved(garment: &Garment, positions: &[[f64; 3]]) -> Result<MovedObj, Report> 
     Ok(MovedObj { obj: text.into_bytes(), mtl: None, libraries: Vec::new() })
 }
 
-fn text(report: &ResolveReport) -> String {
+fn text(report: &ResolveReport, keeps_self: bool) -> String {
     let row = |what: &str, value: fn(&Certificate) -> Option<f64>| {
         let [before, after] = [&report.certificate_before, &report.certificate].map(value);
         row!["" => what, "before" => before, "after" => after]
@@ -303,6 +300,8 @@ fn text(report: &ResolveReport) -> String {
             "file" => garment.output.display().to_string(),
         }
     });
-    let stopped = stopped(&report.certificate).map_or_else(String::new, |text| format!("\n{text}\n"));
-    format!("{}\n{}{stopped}", table(&rows), table(&garments.collect::<Vec<_>>()))
+    let found = &report.certificate;
+    let pairs = if keeps_self { found.between() } else { found.pairs() };
+    let left = left_over(pairs, found.is_stopped).map_or_else(String::new, |text| format!("\n{text}\n"));
+    format!("{}\n{}{left}", table(&rows), table(&garments.collect::<Vec<_>>()))
 }

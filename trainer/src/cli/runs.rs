@@ -18,16 +18,16 @@ pub struct Arguments {
     /// A folder of runs, or one run
     #[arg(value_name = "DIR", default_value = "runs")]
     folder: PathBuf,
-    /// Order of the rows
-    #[arg(long, value_enum, default_value_t = Order::Name)]
-    sort: Order,
+    /// RunOrder of the rows
+    #[arg(long, value_enum, default_value_t = RunOrder::Name)]
+    sort: RunOrder,
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
-enum Order {
+enum RunOrder {
     /// By name
     Name,
     /// Best validation first
@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             arguments.folder.display()
         ));
     }
-    if arguments.sort == Order::Score {
+    if arguments.sort == RunOrder::Score {
         let score = |r: &FoundRun| r.best_score().unwrap_or(f64::INFINITY);
         runs.sort_by(|a, b| score(a).total_cmp(&score(b)));
     }

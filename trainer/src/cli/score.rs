@@ -1,8 +1,8 @@
 //! `clothcombo score`: anyone's draped meshes, measured.
 
 use super::output::print_report;
-use super::table::{Row, row, table};
-use crate::score::{MeshFiles, Score, ScoreDistance, TermValues, score_files};
+use super::table::{Row, number, row, table};
+use crate::score::{NamedMesh, SceneMeshes, Score, ScoreDistance, TermValues, score_meshes};
 use clap::Parser;
 use miette::Report;
 use std::path::PathBuf;
@@ -41,10 +41,17 @@ pub struct Arguments {
 /// # Errors
 /// When a file cannot be read, or meshes do not fit together.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let Arguments { body, rest, draped, canonical, .. } = arguments;
-    let files = MeshFiles { body, rest, draped, canonical };
+    let load = |paths: &[PathBuf]| -> Result<Vec<NamedMesh>, Report> {
+        paths.iter().map(|path| NamedMesh::load(path)).collect()
+    };
+    let meshes = SceneMeshes {
+        body: NamedMesh::load_body(&arguments.body)?,
+        rest: load(&arguments.rest)?,
+        draped: load(&arguments.draped)?,
+        canonical: load(&arguments.canonical)?,
+    };
     let distance = if arguments.surface { ScoreDistance::Surface } else { ScoreDistance::NearestVertex };
-    let score = score_files(&files, distance)?;
+    let score = score_meshes(meshes, distance)?;
     print_report(arguments.json, &score, tables)
 }
 
@@ -58,25 +65,21 @@ const TERMS: [(&str, &str, &str); 6] = [
     ("holding", "holding", "m²"),
 ];
 
+/// Cells of the terms that have values, whose headings name the units `with_units`.
+pub(super) fn term_cells(values: &TermValues, with_units: bool) -> Row {
+    let cell = |(term, heading, unit): &(&str, &str, &str)| {
+        let heading = if with_units { format!("{heading} [{unit}]") } else { heading.to_string() };
+        Some((heading, number(*values.get(*term)?)))
+    };
+    TERMS.iter().filter_map(cell).collect()
+}
+
 fn tables(score: &Score) -> String {
     let garments = || score.garments.iter();
-    // Holding needs canonical meshes.
-    let has = |term: &str| garments().any(|g| g.raw.contains_key(term));
-    let terms = || TERMS.iter().filter(|(term, ..)| has(term));
-    let raw_row = |name: &str, values: &TermValues| {
-        let mut row = row!["raw" => name];
-        for (term, heading, unit) in terms() {
-            row.extend(row![format!("{heading} [{unit}]") => values.get(*term).copied()]);
-        }
-        row
-    };
+    let raw_row = |name: &str, values: &TermValues| [row!["raw" => name], term_cells(values, true)].concat();
     let weighted_row = |name: &str, values: &TermValues| {
-        let mut row = row!["weighted [J]" => name];
-        for (term, heading, _) in terms() {
-            row.extend(row![heading => values.get(*term).copied()]);
-        }
-        row.extend(row!["sum" => values.values().sum::<f64>()]);
-        row
+        let sum = row!["sum" => values.values().sum::<f64>()];
+        [row!["weighted [J]" => name], term_cells(values, false), sum].concat()
     };
     let mut raw: Vec<Row> = garments().map(|g| raw_row(&g.name, &g.raw)).collect();
     let mut weighted: Vec<Row> = garments().map(|g| weighted_row(&g.name, &g.weighted)).collect();

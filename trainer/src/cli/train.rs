@@ -24,7 +24,7 @@ use crate::training::session::Session;
 use crate::training::train_loop::train;
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
-use origin::{Loaded, Origin};
+use origin::RunOrigin;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -147,9 +147,10 @@ fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
     let root = named.unwrap_or_else(|| default_run_dir(&file, arguments.resume.is_some()));
     let config = load(&file, &arguments.overrides)?;
     // All that can be wrong is found out before anything is made.
-    let origin = Origin::find(arguments, &root, &config, group)?;
+    let resume = arguments.resume.as_ref().map(Option::as_deref);
+    let origin = RunOrigin::find(resume, &arguments.allow_config_change, &root, &config, group)?;
     let device = arguments.device.open()?;
-    let Loaded { dataset, check } = origin.load_data(&config, group)?;
+    let (dataset, check) = origin.load_data(&config, group)?;
     print_data(&dataset);
     make_pose_bank(&dataset.poses);
     let (run, mut session) = origin.begin(&root, &config, &dataset, &device, group)?;

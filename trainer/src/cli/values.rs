@@ -1,6 +1,7 @@
 //! What the values of flags must be, where the type alone does not say it.
 
 use crate::config::MOST_GENERATED_GARMENTS;
+use crate::inference::MOST_SHAPE;
 use crate::system::paths::obstacle;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -43,8 +44,12 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 
 /// A gap between garments (mm), in the bounds of the post-process.
 pub fn gap_mm(text: &str) -> Result<f64, String> {
-    const MOST: f64 = 1e3 * ResolveSettings::LARGEST_GAP;
-    number(text, |gap| gap > 0.0 && gap <= MOST, &format!("greater than 0 and at most {MOST} mm"))
+    const MOST_GAP_MM: f64 = 1e3 * ResolveSettings::LARGEST_GAP;
+    number(
+        text,
+        |gap| gap > 0.0 && gap <= MOST_GAP_MM,
+        &format!("greater than 0 and at most {MOST_GAP_MM} mm"),
+    )
 }
 
 /// Time spent on one measurement, at most a day (s).
@@ -61,6 +66,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// A finite number from 0 up.
 pub fn not_negative(text: &str) -> Result<f64, String> {
     number(text, |x| x.is_finite() && x >= 0.0, "a finite number from 0 up")
+}
+
+/// A shape parameter of a body.
+pub fn shape_parameter(text: &str) -> Result<f64, String> {
+    number(text, |x| x.abs() <= MOST_SHAPE, &format!("a finite number from -{MOST_SHAPE} to {MOST_SHAPE}"))
 }
 
 /// A PNG file that can be made: a picture is written at the end of the work, over what has its name. Its folder need not be

@@ -14,7 +14,7 @@ pub struct ActiveJoints {
 }
 
 /// Below this weight on every vertex of every garment a joint is dropped; its nearest active ancestor takes the weight.
-const NEGLIGIBLE: f32 = 1e-3;
+const NEGLIGIBLE_WEIGHT: f32 = 1e-3;
 
 impl ActiveJoints {
     /// Collects the joints in use from the largest weight of every joint on each garment
@@ -25,7 +25,7 @@ impl ActiveJoints {
         for garment in garments {
             largest.iter_mut().zip(garment).for_each(|(l, w)| *l = l.max(*w));
         }
-        Self::of(body, (0..joints).filter(|&j| largest[j] > NEGLIGIBLE).collect())
+        Self::of(body, (0..joints).filter(|&j| largest[j] > NEGLIGIBLE_WEIGHT).collect())
     }
 
     /// The joints of these names, in this order: those that trained networks see.
@@ -33,13 +33,12 @@ impl ActiveJoints {
     /// # Errors
     /// The names that `body` has no joint of.
     pub fn named(body: &Body, names: &[String]) -> Result<Self, Vec<String>> {
-        let find =
-            |name: &String| body.joint_names.iter().position(|n| n == name).ok_or_else(|| name.clone());
-        let (found, missing): (Vec<_>, Vec<_>) = names.iter().map(find).partition(Result::is_ok);
-        if !missing.is_empty() {
-            return Err(missing.into_iter().filter_map(Result::err).collect());
+        let find = |name: &String| body.joint_names.iter().position(|n| n == name);
+        let missing: Vec<String> = names.iter().filter(|name| find(name).is_none()).cloned().collect();
+        match missing.is_empty() {
+            true => Ok(Self::of(body, names.iter().filter_map(find).collect())),
+            false => Err(missing),
         }
-        Ok(Self::of(body, found.into_iter().filter_map(Result::ok).collect()))
     }
 
     fn of(body: &Body, indices: Vec<usize>) -> Self {

@@ -1,19 +1,20 @@
 //! What the scenes of a run are sampled from: body, garments, poses.
 
 use super::active_joints::ActiveJoints;
+use super::body::{body_source, load_body};
 use super::data_list::DataList;
 use super::error::DatasetError;
 use super::garment_store::GarmentStore;
-use super::poses::{HeldOut, PoseLibrary};
-use super::split::{GarmentSplit, SplitNames};
-use crate::config::Config;
+use super::poses::{HeldOut, PoseLibrary, Window};
+use super::sizes::{DataSizes, reads_tests};
+use super::split::GarmentSplit;
+use crate::config::{Config, DataConfig};
 use crate::system::lru_cache::MemoryBudget;
-use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings, Pose, Provenance};
+use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, Pose, Provenance};
 use clothcombo_data::cache::{Key, KeyBuilder, body_key};
-use clothcombo_data::format::npz::NpzFile;
-use clothcombo_data::generate::mannequin;
 use clothcombo_model::{Dimensions, Graph};
-use std::path::{Path, PathBuf};
+use serde::Serialize;
+use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 /// What the scenes of a run are sampled from.
@@ -40,34 +41,9 @@ pub struct Dataset {
     /// Range every component is sampled from.
     pub shape_range: [f64; 2],
     /// Folder of the motions, if poses come from motions.
-    pub(super) motions: Option<PathBuf>,
+    motions: Option<PathBuf>,
     fingerprint: OnceLock<String>,
     list: OnceLock<DataList>,
-}
-
-/// Reads `"mannequin"` or a body npz with at most `shape_components` components (0: all it has).
-///
-/// # Errors
-/// When the file is not a body model.
-pub fn load_body(name: &str, shape_components: usize) -> Result<Body, DatasetError> {
-    match name {
-        "mannequin" => Ok(mannequin().with_shape_components(limit(shape_components))),
-        path => read_body(NpzFile::open(Path::new(path)).map_err(DatasetError::data)?, shape_components),
-    }
-}
-
-/// As [`load_body`], from an open archive.
-///
-/// # Errors
-/// When it is no body.
-pub fn read_body(file: NpzFile, shape_components: usize) -> Result<Body, DatasetError> {
-    let settings = BodyFileSettings { shape_components: limit(shape_components) };
-    Body::read(file, &settings).map_err(DatasetError::data)
-}
-
-/// Shape components to be read at most; 0: all.
-fn limit(shape_components: usize) -> usize {
-    if shape_components == 0 { usize::MAX } else { shape_components }
 }
 
 /// Assets of one author under one licence.
@@ -81,29 +57,31 @@ pub struct LicenceLine {
     pub count: usize,
 }
 
+/// The split of a run by name.
+#[derive(Clone, Debug, Serialize)]
+pub struct SplitNames {
+    /// Garments trained on.
+    pub training_garments: Vec<String>,
+    /// Garments scored during the run, never trained on.
+    pub validation_garments: Vec<String>,
+    /// Garments neither trained on nor scored during the run.
+    pub test_garments: Vec<String>,
+    /// Motion clips trained on, but for the windows held out of them and the margins around those.
+    pub training_clips: Vec<String>,
+    /// Windows held out of those clips, and short clips held out whole, scored during the run.
+    pub validation_windows: Vec<Window>,
+    /// Motion clips scored during the run, never trained on.
+    pub validation_clips: Vec<String>,
+    /// Motion clips neither trained on nor scored during the run.
+    pub test_clips: Vec<String>,
+}
+
 /// What a fingerprint of this kind begins with; earlier ones looked at less, or split the poses otherwise.
 const FINGERPRINT: &str = "4:";
 
 /// Whether `text` is a [fingerprint](Dataset::fingerprint) as they are made now, and can be compared with another.
 pub fn is_fingerprint(text: &str) -> bool {
     text.starts_with(FINGERPRINT)
-}
-
-/// What a body file says about where it comes from; empty where it says nothing.
-fn body_source(name: &str) -> Provenance {
-    if name == "mannequin" {
-        return Provenance {
-            source: "built in".into(),
-            author: "ClothCombo-rs".into(),
-            licence: "CC0-1.0".into(),
-        };
-    }
-    let Ok(mut file) = NpzFile::open(Path::new(name)) else { return Provenance::default() };
-    let mut text = |key: &str| {
-        let found = file.strings(key, "").ok().and_then(|array| array.data.into_iter().next());
-        found.unwrap_or_default()
-    };
-    Provenance { source: text("source"), author: text("author"), licence: text("licence") }
 }
 
 /// `key` with the poses of every one of `parts`.
@@ -141,12 +119,17 @@ impl Dataset {
         DatasetError::check_inputs(config)?;
         let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
         if body.joint_count() < BODY_JOINT_COUNT {
-            return Err(DatasetError::FewJoints { name: body.name.clone(), joints: body.joint_count() });
+            return Err(DatasetError::few_joints(&body));
         }
         let shape_count = match config.data.shape_components {
             0 => body.shape_count,
             asked if asked <= body.shape_count => asked,
-            asked => return Err(DatasetError::ShapeComponents { asked, available: body.shape_count }),
+            asked => {
+                return Err(DatasetError::new(
+                    format!("data.shape_components = {asked}, but the body has {}", body.shape_count),
+                    "use 0 to take all the body has",
+                ));
+            }
         };
         let poses = PoseLibrary::new(&config.data.poses, &body)?.with_bank(config);
         let memory = MemoryBudget::new(config.data.memory_limits());
@@ -193,7 +176,9 @@ impl Dataset {
 
     /// What the data consists of, by name.
     pub fn list(&self) -> &DataList {
-        self.list.get_or_init(|| DataList::of(self))
+        self.list.get_or_init(|| {
+            DataList::of(&self.body, &self.garments, self.motions.as_deref(), &self.poses.clips())
+        })
     }
 
     /// A fingerprint of what outfits in held-out windows are sampled from: garments, body, and the frames of the
@@ -252,6 +237,14 @@ impl Dataset {
     pub fn dimensions(&self) -> Dimensions {
         let joints = self.joints().len();
         Dimensions { joints, shape: self.shape_count, pose: joints * self.poses.encoding.per_joint() }
+    }
+
+    /// What of it a run's memory depends on; `config` names the data.
+    pub fn sizes(&self, config: &DataConfig) -> DataSizes {
+        let tests = if reads_tests(config) { &self.split.test[..] } else { &[] };
+        let read = self.split.training.iter().chain(&self.split.validation).chain(tests);
+        let vertices = read.map(|i| self.garments.info(*i).vertices).collect();
+        DataSizes { joints: self.joints().len(), ..DataSizes::of_body(vertices, &self.body) }
     }
 
     /// Joints the networks see.

@@ -1,11 +1,10 @@
 //! Is the data of a configuration fit to train on? The judgement of `clothcombo check`, before anything is made.
 
-use super::contents::load_body;
+use super::body::load_body;
 use super::error::DatasetError;
 use super::garment_source::GarmentSource;
 use crate::config::Config;
 use crate::system::paths::lossy;
-use clothcombo_data::asset::Body;
 use clothcombo_data::check::{Checker, FileCheck, ManifestHints, Target};
 use clothcombo_data::folders::{ListedGarment, list_motion_folder};
 use rayon::prelude::*;
@@ -49,7 +48,7 @@ pub struct FileWarnings {
 }
 
 /// A file, the name of what it holds, and how to check it.
-struct Checked {
+struct CheckedFile {
     name: String,
     target: Target,
 }
@@ -62,7 +61,7 @@ impl DataCheck {
     pub fn run(config: &Config, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Self, DatasetError> {
         DatasetError::check_inputs(config)?;
         let sources = GarmentSource::list(&config.data.garments)?;
-        let mut files: Vec<Checked> = sources.into_iter().filter_map(garment).collect();
+        let mut files: Vec<CheckedFile> = sources.into_iter().filter_map(garment).collect();
         if let Some(folder) = &config.data.poses.motions {
             files.extend(list_motion_folder(folder).map_err(DatasetError::data)?.into_iter().map(motion));
         }
@@ -70,13 +69,15 @@ impl DataCheck {
             return Ok(Self::default());
         }
         let body = load_body(&config.data.body, config.data.shape_components)?;
-        if let Some(fault) = body_fault(&body, &config.data.body) {
+        if let Some(what) = body.implausibility() {
             // Everything else would be measured on it.
+            let remedy = "convert it to metres, y up, facing +z".into();
+            let fault = Fault { name: body.name.clone(), file: (&config.data.body).into(), what, remedy };
             return Ok(Self { files: 1, faults: vec![fault], warnings: Vec::new() });
         }
         let checker = Checker::new(body);
         let done = AtomicUsize::new(0);
-        let check = |file: &Checked| {
+        let check = |file: &CheckedFile| {
             let found = checker.check(&file.target);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, files.len());
             found
@@ -94,29 +95,20 @@ impl DataCheck {
     }
 }
 
-fn garment(source: GarmentSource) -> Option<Checked> {
+fn garment(source: GarmentSource) -> Option<CheckedFile> {
     let GarmentSource::File(ListedGarment { path, name, category, holding, layer, .. }) = source else {
         return None;
     };
     let entry = ManifestHints { category, layer, holding };
-    Some(Checked { name, target: Target::Garment { path, entry } })
+    Some(CheckedFile { name, target: Target::Garment { path, entry } })
 }
 
-fn motion(path: PathBuf) -> Checked {
+fn motion(path: PathBuf) -> CheckedFile {
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Checked { name, target: Target::Npz { path } }
+    CheckedFile { name, target: Target::Npz { path } }
 }
 
-fn body_fault(body: &Body, file: &str) -> Option<Fault> {
-    body.implausibility().map(|what| Fault {
-        name: body.name.clone(),
-        file: file.into(),
-        what,
-        remedy: "convert it to metres, y up, facing +z".into(),
-    })
-}
-
-fn fault(file: &Checked, found: &FileCheck, reason: &str, body: &str) -> Fault {
+fn fault(file: &CheckedFile, found: &FileCheck, reason: &str, body: &str) -> Fault {
     let path = found.path.display().to_string();
     let remedy = match found.garment {
         Some(_) => format!("clothcombo fit {path} --body {body} -o {}.obj", file.name),

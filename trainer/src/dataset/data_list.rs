@@ -1,11 +1,14 @@
 //! What the data of a run consists of, by name: with it a checkpoint tells which garment, clip or body is another one now.
 
-use super::contents::Dataset;
-use clothcombo_data::cache::{KeyBuilder, body_key};
+use super::body::with_body;
+use super::garment_store::GarmentStore;
+use super::poses::ClipSplit;
+use clothcombo_data::asset::Body;
+use clothcombo_data::cache::KeyBuilder;
 use clothcombo_data::folders::list_motion_folder;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
@@ -16,7 +19,7 @@ pub struct DataList(Vec<Datum>);
 /// One of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Datum {
-    kind: Kind,
+    kind: DatumKind,
     name: String,
     /// What it is, in words that differ where it differs.
     is: String,
@@ -24,27 +27,19 @@ struct Datum {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum Kind {
+enum DatumKind {
     Body,
     Garment,
     Clip,
 }
 
-impl Kind {
-    /// The key of the configuration that says where it comes from.
-    fn key(self) -> &'static str {
+impl DatumKind {
+    /// What it is called, and the key of the configuration that says where it comes from.
+    fn words(self) -> (&'static str, &'static str) {
         match self {
-            Self::Body => "data.body",
-            Self::Garment => "data.garments",
-            Self::Clip => "data.poses",
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Body => "body",
-            Self::Garment => "garment",
-            Self::Clip => "clip",
+            Self::Body => ("body", "data.body"),
+            Self::Garment => ("garment", "data.garments"),
+            Self::Clip => ("clip", "data.poses"),
         }
     }
 }
@@ -62,56 +57,50 @@ pub struct DataChange {
 const DIGITS: usize = 12;
 
 impl DataList {
-    /// The list of `dataset`; clips are read once more, as files.
-    pub(super) fn of(dataset: &Dataset) -> Self {
-        let body = &dataset.body;
-        let digest = KeyBuilder::new("body")
-            .key(body_key(body))
-            .array(body.joint_template.as_flattened())
-            .array(body.pose_directions.as_deref().unwrap_or_default())
-            .finish();
+    /// The list of a run's data; the clips in the folder `motions`, split into `clips`, are read once more, as files.
+    pub(super) fn of(
+        body: &Body,
+        garments: &GarmentStore,
+        motions: Option<&Path>,
+        clips: &ClipSplit,
+    ) -> Self {
+        let digest = with_body(KeyBuilder::new("body"), body).finish();
         let mut all = vec![Datum {
-            kind: Kind::Body,
+            kind: DatumKind::Body,
             name: body.name.clone(),
             is: format!("{} vertices, {}", body.vertex_count(), short(&digest.to_string())),
         }];
-        all.extend((0..dataset.garments.len()).map(|index| {
-            let garment = dataset.garments.info(index);
+        all.extend((0..garments.len()).map(|index| {
+            let garment = garments.info(index);
             let held = if garment.holding { "held" } else { "not held" };
             let (category, vertices, mesh) = (garment.category, garment.vertices, garment.mesh.to_string());
             Datum {
-                kind: Kind::Garment,
+                kind: DatumKind::Garment,
                 name: garment.name.clone(),
                 is: format!("{category}, {held}, {vertices} vertices, {}", short(&mesh)),
             }
         }));
-        let files = dataset.motions.as_deref().and_then(|folder| list_motion_folder(folder).ok());
-        let clips: Vec<Datum> =
-            files.unwrap_or_default().par_iter().map(|file| clip(file, dataset)).collect();
-        all.extend(clips);
+        let files = motions.and_then(|folder| list_motion_folder(folder).ok()).unwrap_or_default();
+        all.extend(files.par_iter().map(|file| clip(file, clips)).collect::<Vec<_>>());
         Self(all)
     }
 
     /// What is not in this list as it is in `earlier`.
     pub fn changes_since(&self, earlier: &Self) -> Vec<DataChange> {
         let [now, before] = [self, earlier].map(Self::by_name);
-        let names: BTreeMap<_, ()> = now.keys().chain(before.keys()).map(|name| (*name, ())).collect();
-        let differs = names.into_keys().filter(|name| now.get(name) != before.get(name));
-        let change = |(kind, name): (Kind, &str)| {
-            let side = |list: &BTreeMap<_, Vec<&str>>, missing: &str| {
-                list.get(&(kind, name)).map_or_else(|| missing.to_owned(), |all| all.join(" and "))
-            };
-            let (is, was) = (side(&now, "missing"), side(&before, "missing"));
-            DataChange {
-                key: kind.key(),
-                text: format!("{} {name}: {is} now; {was} in the checkpoint", kind.name()),
-            }
+        let names: BTreeSet<_> = now.keys().chain(before.keys()).copied().collect();
+        let differs = names.into_iter().filter(|name| now.get(name) != before.get(name));
+        let change = |(kind, name): (DatumKind, &str)| {
+            let [is, was] = [&now, &before]
+                .map(|list| list.get(&(kind, name)).map_or("missing".to_owned(), |all| all.join(" and ")));
+            let (what, key) = kind.words();
+            DataChange { key, text: format!("{what} {name}: {is} now; {was} in the checkpoint") }
         };
         differs.map(change).collect()
     }
 
     /// Names are unique within a source only.
-    fn by_name(&self) -> BTreeMap<(Kind, &str), Vec<&str>> {
+    fn by_name(&self) -> BTreeMap<(DatumKind, &str), Vec<&str>> {
         let mut all: BTreeMap<_, Vec<&str>> = BTreeMap::new();
         for datum in &self.0 {
             all.entry((datum.kind, datum.name.as_str())).or_default().push(&datum.is);
@@ -120,9 +109,8 @@ impl DataList {
     }
 }
 
-fn clip(file: &Path, dataset: &Dataset) -> Datum {
+fn clip(file: &Path, clips: &ClipSplit) -> Datum {
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let clips = dataset.poses.clips();
     let purpose = match () {
         () if clips.validation.contains(&name) => "for validation",
         () if clips.test.contains(&name) => "for the test",
@@ -130,7 +118,7 @@ fn clip(file: &Path, dataset: &Dataset) -> Datum {
     };
     let digest =
         fs::read(file).map_or_else(|e| e.to_string(), |bytes| blake3::hash(&bytes).to_hex().to_string());
-    Datum { kind: Kind::Clip, name, is: format!("{purpose}, {}", short(&digest)) }
+    Datum { kind: DatumKind::Clip, name, is: format!("{purpose}, {}", short(&digest)) }
 }
 
 fn short(digest: &str) -> &str {
@@ -143,15 +131,23 @@ mod tests {
 
     #[test]
     fn changes_are_told_by_name_with_both_values() {
-        let list = |all: &[(Kind, &str, &str)]| {
+        let list = |all: &[(DatumKind, &str, &str)]| {
             DataList(
                 all.iter()
                     .map(|(kind, name, is)| Datum { kind: *kind, name: (*name).into(), is: (*is).into() })
                     .collect(),
             )
         };
-        let before = list(&[(Kind::Body, "b", "1"), (Kind::Garment, "tee", "2"), (Kind::Clip, "walk", "3")]);
-        let now = list(&[(Kind::Body, "b", "1"), (Kind::Garment, "tee", "5"), (Kind::Garment, "coat", "4")]);
+        let before = list(&[
+            (DatumKind::Body, "b", "1"),
+            (DatumKind::Garment, "tee", "2"),
+            (DatumKind::Clip, "walk", "3"),
+        ]);
+        let now = list(&[
+            (DatumKind::Body, "b", "1"),
+            (DatumKind::Garment, "tee", "5"),
+            (DatumKind::Garment, "coat", "4"),
+        ]);
         let changes: Vec<_> = now.changes_since(&before).into_iter().map(|c| (c.key, c.text)).collect();
         assert_eq!(
             changes,

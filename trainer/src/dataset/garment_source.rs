@@ -46,8 +46,12 @@ impl GarmentSource {
             if !source.only.is_empty() {
                 let names: Vec<String> = own.iter().map(Self::name).collect();
                 if let Some(name) = source.only.iter().find(|wanted| !names.contains(wanted)) {
-                    let (name, available) = (name.clone(), names.join(", "));
-                    return Err(DatasetError::UnknownOnly { source_index, name, available });
+                    return Err(DatasetError::new(
+                        format!(
+                            "data.garments[{source_index}].only names {name:?}, which is no garment of this source"
+                        ),
+                        format!("the garments are: {}", names.join(", ")),
+                    ));
                 }
                 own.retain(|origin| source.only.contains(&origin.name()));
             }
@@ -68,7 +72,7 @@ impl GarmentSource {
     }
 
     /// Name of the garment, unique within a source.
-    pub(super) fn name(&self) -> String {
+    pub fn name(&self) -> String {
         match self {
             Self::File(listed) => listed.name.clone(),
             Self::Generated { category, seed, .. } => GarmentGenerator::name(*category, *seed),

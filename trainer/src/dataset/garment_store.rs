@@ -10,11 +10,11 @@ use super::error::DatasetError;
 use super::garment_source::{GarmentLoader, GarmentSource};
 use super::prepared_garment::PreparedGarment;
 use super::preprocessor::Preprocessor;
+use super::sizes::DataSizes;
 use crate::config::Config;
-use crate::dataset::DataSizes;
 use crate::system::allocator::return_freed_memory;
 use crate::system::lru_cache::{LruCache, MemoryBudget, Residence};
-use crate::system::memory::available;
+use crate::system::memory::{available, gibibytes};
 use clothcombo_data::asset::{Binding, Body, Category, Garment, GarmentMaterial, Provenance};
 use clothcombo_data::cache::{ArrayCache, Key, mesh_key};
 use clothcombo_physics::operators::SurfaceOperators;
@@ -48,19 +48,15 @@ pub struct GarmentStore {
     joints: ActiveJoints,
     /// Of each garment, what stays in memory: everything without a cache, nothing of what a cache has.
     kept: Vec<Option<Kept>>,
-    streamed: Streamed,
+    /// The others, read from the cache: those used last.
+    recent: LruCache<PreparedGarment>,
+    sources: Vec<GarmentSource>,
+    preprocessor: Preprocessor,
 }
 
 struct Kept {
     garment: Arc<PreparedGarment>,
     operators: Arc<SurfaceOperators>,
-}
-
-/// Reads from the cache, and makes again what is not there.
-struct Streamed {
-    recent: LruCache<PreparedGarment>,
-    sources: Vec<GarmentSource>,
-    preprocessor: Preprocessor,
 }
 
 /// What the first pass over a garment leaves.
@@ -77,7 +73,7 @@ impl GarmentStore {
     /// `progress(done, total, name)` is called per garment. A cache that cannot be used costs time and memory only.
     ///
     /// # Errors
-    /// [`DatasetError`] names the file or garment at fault; [`DatasetError::Memory`] if the machine cannot hold garments that
+    /// [`DatasetError`] names the file or garment at fault; or says so if the machine cannot hold garments that
     /// are not streamed, before any of them is prepared.
     pub fn load(
         config: &Config,
@@ -95,7 +91,15 @@ impl GarmentStore {
             let Some(available) = available() else { return Ok(()) };
             let needed = DataSizes::of_listed(&sources, &preprocessor.body)?.unstreamed_bytes(config);
             match needed > available {
-                true => Err(DatasetError::Memory { garments: sources.len(), needed, available }),
+                true => Err(DatasetError::new(
+                    format!(
+                        "the {} garments take about {} of memory, of which {} are available",
+                        sources.len(),
+                        gibibytes(needed),
+                        gibibytes(available)
+                    ),
+                    "set data.cache.folder: what is computed from a garment is then kept on disk, and read when a scene needs it",
+                )),
                 false => Ok(()),
             }
         };
@@ -109,7 +113,11 @@ impl GarmentStore {
         return_freed_memory();
         let joints = match joints {
             Some(names) => ActiveJoints::named(&preprocessor.body, names).map_err(|missing| {
-                DatasetError::MissingJoints { body: preprocessor.body.name.clone(), missing }
+                let (body, missing) = (&preprocessor.body.name, missing.join(", "));
+                DatasetError::new(
+                    format!("body {body} has no joint {missing}, which the networks were trained with"),
+                    "use the body of the checkpoint, or train a new model",
+                )
             })?,
             None => ActiveJoints::new(
                 &preprocessor.body,
@@ -124,7 +132,7 @@ impl GarmentStore {
         };
         let kept = index.into_par_iter().map(finish).collect::<Result<Vec<_>, DatasetError>>()?;
         let recent = LruCache::new(memory, Residence::Host);
-        Ok(Self { infos, joints, kept, streamed: Streamed { recent, sources, preprocessor } })
+        Ok(Self { infos, joints, kept, recent, sources, preprocessor })
     }
 
     /// Computes and stores what the cache of `config` does not hold of every `of`-th garment from garment `part` on, so
@@ -139,13 +147,18 @@ impl GarmentStore {
         [part, of]: [usize; 2],
         progress: &(dyn Fn(usize, usize, &str) + Sync),
     ) -> Result<(usize, u64), DatasetError> {
-        let folder = config.data.cache.folder.as_ref().ok_or(DatasetError::NoCache)?;
+        let folder = config.data.cache.folder.as_ref().ok_or_else(|| {
+            DatasetError::new(
+                "the configuration names no cache to prepare".to_owned(),
+                "set data.cache.folder, in the file or with --set data.cache.folder=\"datasets/cache/prepared\"",
+            )
+        })?;
         let cache = ArrayCache::open(folder, config.data.cache_limit()).map_err(DatasetError::data)?;
         let sources: Vec<_> =
             GarmentSource::list(&config.data.garments)?.into_iter().skip(part).step_by(of.max(1)).collect();
         let preprocessor = Preprocessor::new(config, body).with_cache(cache);
         // What is not stored was prepared for nothing.
-        let stop = || Err(DatasetError::Data(preprocessor.store_failure().unwrap_or_default().to_owned()));
+        let stop = || preprocessor.store_failure().map_or(Ok(()), |e| Err(DatasetError::data(e)));
         index_garments(&sources, &preprocessor, config.data.max_vertices, &stop, progress)?;
         Ok((sources.len(), preprocessor.cache().map_or(0, ArrayCache::used)))
     }
@@ -178,13 +191,12 @@ impl GarmentStore {
         if let Some(kept) = &self.kept[index] {
             return Ok(kept.garment.clone());
         }
-        let streamed = &self.streamed;
-        if let Some(garment) = streamed.recent.get(index) {
+        if let Some(garment) = self.recent.get(index) {
             return Ok(garment);
         }
-        let garment = streamed.read(index, &self.infos[index], &self.joints)?;
+        let garment = self.read(index)?;
         let bytes = garment.bytes();
-        Ok(streamed.recent.insert(index, garment, bytes))
+        Ok(self.recent.insert(index, garment, bytes))
     }
 
     /// DiffusionNet's operators of garment `index`.
@@ -192,38 +204,30 @@ impl GarmentStore {
     /// # Errors
     /// As [`garment`](Self::garment).
     pub fn operators(&self, index: usize) -> Result<Arc<SurfaceOperators>, DatasetError> {
-        match &self.kept[index] {
-            Some(kept) => Ok(kept.operators.clone()),
-            None => self.streamed.operators(index, &self.infos[index]).map(Arc::new),
+        if let Some(kept) = &self.kept[index] {
+            return Ok(kept.operators.clone());
         }
+        let GarmentInfo { name, mesh, .. } = &self.infos[index];
+        let operators = match self.preprocessor.stored_operators(*mesh) {
+            Some(operators) => operators,
+            None => self.preprocessor.operators(name, &self.again(index)?.rest, *mesh)?,
+        };
+        Ok(Arc::new(operators))
     }
-}
 
-impl Streamed {
-    fn read(
-        &self,
-        index: usize,
-        info: &GarmentInfo,
-        joints: &ActiveJoints,
-    ) -> Result<PreparedGarment, DatasetError> {
-        let (rest, binding) = match self.preprocessor.stored_binding(info.mesh, info.category) {
+    /// Garment `index`, from the cache.
+    fn read(&self, index: usize) -> Result<PreparedGarment, DatasetError> {
+        let GarmentInfo { name, category, holding, material, source, mesh, .. } = self.infos[index].clone();
+        let (rest, binding) = match self.preprocessor.stored_binding(mesh, category) {
             Some(found) => found,
             None => {
                 let garment = self.again(index)?;
-                let binding = self.preprocessor.binding(&garment, info.mesh);
+                let binding = self.preprocessor.binding(&garment, mesh);
                 (garment.rest, binding)
             }
         };
-        let GarmentInfo { name, category, holding, material, source, .. } = info.clone();
         let garment = Garment { name, category, rest, holding, material, source };
-        self.preprocessor.finish(garment, binding, joints)
-    }
-
-    fn operators(&self, index: usize, info: &GarmentInfo) -> Result<SurfaceOperators, DatasetError> {
-        match self.preprocessor.stored_operators(info.mesh) {
-            Some(operators) => Ok(operators),
-            None => self.preprocessor.operators(&info.name, &self.again(index)?.rest, info.mesh),
-        }
+        self.preprocessor.finish(garment, binding, &self.joints)
     }
 
     /// Garment `index`, whose record was there at the start of the run and no longer is.
@@ -266,7 +270,13 @@ fn index_garments(
         let garment = loader.load(source)?;
         let vertices = garment.rest.vertex_count();
         if vertices > max_vertices {
-            return Err(DatasetError::TooLarge { name: garment.name, vertices, limit: max_vertices });
+            let name = garment.name;
+            return Err(DatasetError::new(
+                format!(
+                    "garment {name} has {vertices} vertices, more than data.max_vertices = {max_vertices}"
+                ),
+                "raise data.max_vertices (memory grows with it), or decimate the garment",
+            ));
         }
         let info = GarmentInfo {
             name: garment.name.clone(),

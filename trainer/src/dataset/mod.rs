@@ -2,6 +2,7 @@
 //! functions of seed and step, and prepared scenes with their energies.
 
 mod active_joints;
+mod body;
 mod contents;
 mod data_check;
 mod data_list;
@@ -20,7 +21,8 @@ mod skinning;
 mod split;
 
 pub use active_joints::ActiveJoints;
-pub use contents::{Dataset, LicenceLine, is_fingerprint, load_body, read_body};
+pub use body::{load_body, read_body};
+pub use contents::{Dataset, LicenceLine, SplitNames, is_fingerprint};
 pub use data_check::{DataCheck, Fault, FileWarnings};
 pub use data_list::{DataChange, DataList};
 pub use error::DatasetError;
@@ -36,7 +38,7 @@ pub use sampling::{
 };
 pub use sizes::{DataSizes, tensor_bytes};
 pub use skinning::skinning_transforms;
-pub use split::{GarmentPurpose, GarmentSplit, SplitNames, purpose};
+pub use split::{GarmentPurpose, GarmentSplit, purpose};
 
 /// Steps whose scenes are prepared in advance.
 pub const SCENES_AHEAD: usize = 4;

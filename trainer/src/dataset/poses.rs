@@ -1,41 +1,31 @@
 //! Poses for training and validation: frames of motion clips, or the sampler within joint limits.
 
 mod bank;
+mod draw;
 mod frames;
 mod hold_out;
 
 use super::error::DatasetError;
-use crate::config::{PoseConfig, PoseEncoding};
-use bank::Bank;
+use crate::config::{Config, PoseConfig, PoseEncoding};
+use bank::{Bank, BankProgress};
 use clothcombo_data::asset::{Body, Pose, Provenance};
 use clothcombo_data::folders::load_motion_folder;
 use clothcombo_data::generate::{PoseAugmentation, PoseSampler, SelfContact};
+use draw::{PoseDraw, SelfIntersectionFilter};
 use frames::Frames;
-pub use frames::{ClipSplit, Window};
+pub use frames::{ClipSplit, HeldOut, Window};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use serde::Serialize;
 use std::sync::Arc;
 
 /// All poses of a run, split by clip.
 pub struct PoseLibrary {
-    source: Source,
-    augmentation: Option<PoseAugmentation>,
-    filter: Option<Filter>,
+    draw: PoseDraw,
     self_intersecting: Option<SelfIntersecting>,
     /// How the networks see a pose.
     pub encoding: PoseEncoding,
-    remove_heading: bool,
     bank: Option<Bank>,
-}
-
-/// Keeps bodies that run through themselves out of training.
-struct Filter {
-    body: Arc<Body>,
-    contact: SelfContact,
-    /// Longest curves of intersection that pass (m).
-    limit: f64,
 }
 
 /// Self-intersections among training poses as they are drawn, before the filter.
@@ -54,26 +44,9 @@ pub struct SelfIntersecting {
 /// From this limit on nothing is filtered (m).
 const NO_FILTER: f64 = 10.0;
 /// Poses drawn before the least self-intersecting one is taken as it is.
-const ATTEMPTS: usize = 8;
+const DRAWN_ATTEMPTS: usize = 8;
 /// Poses drawn to report the share of self-intersecting ones.
 const REPORTED_POSES: usize = 64;
-
-enum Source {
-    Frames(Box<Frames>),
-    Sampler(PoseSampler),
-}
-
-/// Poses never trained on, by what reads them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum HeldOut {
-    /// Windows of the trained clips, which every validation of a run scores; sampled poses where there are no clips.
-    Windows,
-    /// Clips that every validation of a run scores.
-    ValidationClips,
-    /// Clips that no run reads.
-    TestClips,
-}
 
 /// Numbers of captured frames by what they are for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,30 +68,21 @@ impl PoseLibrary {
     /// # Errors
     /// When the folder cannot be read, one of the two parts is empty, or the frame rates of the clips are no rates.
     pub fn new(config: &PoseConfig, body: &Arc<Body>) -> Result<Self, DatasetError> {
-        let source = match &config.motions {
-            None => Source::Sampler(PoseSampler::default()),
-            Some(folder) => {
-                let clips = load_motion_folder(folder).map_err(DatasetError::data)?;
-                Source::Frames(Box::new(Frames::split(&clips, config, folder)?))
-            }
+        let split = |folder| {
+            let clips = load_motion_folder(folder).map_err(DatasetError::data)?;
+            Frames::split(&clips, config, folder)
         };
         let limit = config.max_self_intersection;
-        let filter = (limit < NO_FILTER).then(|| Filter {
-            body: body.clone(),
-            contact: SelfContact::new(body),
-            limit,
-        });
-        let mut dataset = Self {
-            source,
+        let filter = || SelfIntersectionFilter { body: body.clone(), contact: SelfContact::new(body), limit };
+        let draw = PoseDraw {
+            frames: config.motions.as_deref().map(split).transpose()?,
+            sampler: PoseSampler::default(),
             augmentation: config.augmentation.then(PoseAugmentation::default),
-            filter,
-            self_intersecting: None,
-            encoding: config.encoding,
+            filter: (limit < NO_FILTER).then(filter),
             remove_heading: config.remove_heading,
-            bank: None,
         };
-        dataset.self_intersecting = dataset.survey_self_intersections();
-        if let Some(s) = &dataset.self_intersecting {
+        let self_intersecting = survey_self_intersections(&draw);
+        if let Some(s) = &self_intersecting {
             tracing::info!(
                 "self-intersecting bodies: {:.0} % of {} training poses, {:.0} % above {} m and drawn again",
                 100.0 * s.touching,
@@ -127,7 +91,20 @@ impl PoseLibrary {
                 s.limit
             );
         }
-        Ok(dataset)
+        Ok(Self { draw, self_intersecting, encoding: config.encoding, bank: None })
+    }
+
+    /// The same with the bank of poses that `config` asks for, if any; it is made when it is first needed.
+    #[must_use]
+    pub fn with_bank(self, config: &Config) -> Self {
+        Self { bank: Bank::new(config), ..self }
+    }
+
+    /// Makes the bank of training poses, or reads it from the cache; nothing without one.
+    pub fn make_bank(&self, progress: BankProgress<'_>) {
+        if let Some(bank) = &self.bank {
+            bank.poses(&self.draw, progress);
+        }
     }
 
     /// How many training poses intersect themselves before the filter; none where nothing is filtered.
@@ -135,76 +112,41 @@ impl PoseLibrary {
         self.self_intersecting
     }
 
-    fn survey_self_intersections(&self) -> Option<SelfIntersecting> {
-        let filter = self.filter.as_ref()?;
-        let lengths: Vec<f64> = (0..REPORTED_POSES as u64)
-            .into_par_iter()
-            .map(|i| filter.measure(&self.draw_unfiltered(1.0, &mut ChaCha8Rng::seed_from_u64(i))))
-            .collect();
-        let share = |limit: f64| lengths.iter().filter(|l| **l > limit).count() as f64 / lengths.len() as f64;
-        Some(SelfIntersecting {
-            poses: lengths.len(),
-            touching: share(0.0),
-            above_limit: share(filter.limit),
-            limit: filter.limit,
-        })
-    }
-
     /// Numbers of captured frames; none when poses are sampled.
     pub fn frame_counts(&self) -> Option<FrameCounts> {
-        match &self.source {
-            Source::Frames(f) => Some(FrameCounts {
-                training: f.trained(),
-                windows: f.windows.len(),
-                validation: f.validation.len(),
-                test: f.test.len(),
-            }),
-            Source::Sampler(_) => None,
-        }
+        self.draw.frames.as_ref().map(|f| FrameCounts {
+            training: f.trained(),
+            windows: f.windows.len(),
+            validation: f.validation.len(),
+            test: f.test.len(),
+        })
     }
 
     /// All captured poses that a scene may show: trained on clip by clip, of held-out windows, of validation clips, of test
     /// clips.
     pub fn frames(&self) -> Vec<&[Pose]> {
-        match &self.source {
-            Source::Frames(f) => {
-                let held_out = [&f.windows, &f.validation, &f.test].map(Vec::as_slice);
-                f.trained_clips().chain(held_out).collect()
-            }
-            Source::Sampler(_) => Vec::new(),
-        }
+        let Some(f) = &self.draw.frames else { return Vec::new() };
+        f.trained_clips().chain([&f.windows, &f.validation, &f.test].map(Vec::as_slice)).collect()
     }
 
     /// The clips by what they are for; none when poses are sampled.
     pub fn clips(&self) -> ClipSplit {
-        match &self.source {
-            Source::Frames(f) => f.clips.clone(),
-            Source::Sampler(_) => ClipSplit::default(),
-        }
+        self.draw.frames.as_ref().map_or_else(ClipSplit::default, |f| f.clips.clone())
     }
 
     /// Where every clip comes from; none when poses are sampled.
     pub fn sources(&self) -> &[Provenance] {
-        match &self.source {
-            Source::Frames(f) => &f.sources,
-            Source::Sampler(_) => &[],
-        }
+        self.draw.frames.as_ref().map_or(&[], |f| &f.sources)
     }
 
     /// The captured poses of one kind; none when poses are sampled.
     pub fn held_out(&self, kind: HeldOut) -> &[Pose] {
-        match &self.source {
-            Source::Frames(f) => f.held_out(kind),
-            Source::Sampler(_) => &[],
-        }
+        self.draw.frames.as_ref().map_or(&[], |f| f.held_out(kind))
     }
 
     /// Whether there are poses of this kind.
     pub fn has(&self, kind: HeldOut) -> bool {
-        match &self.source {
-            Source::Frames(f) => !f.held_out(kind).is_empty(),
-            Source::Sampler(_) => kind == HeldOut::Windows,
-        }
+        self.draw.frames.as_ref().map_or(kind == HeldOut::Windows, |f| !f.held_out(kind).is_empty())
     }
 
     /// A pose for training, scaled by the progressive schedule, as the networks see it: from the bank if there is one, else
@@ -213,57 +155,14 @@ impl PoseLibrary {
     pub fn sample_training(&self, scale: f64, rng: &mut ChaCha8Rng) -> Pose {
         match &self.bank {
             Some(bank) => {
-                let poses = bank.poses(self, &|_, _| ());
+                let poses = bank.poses(&self.draw, &|_, _| ());
                 poses[rng.random_range(0..poses.len())].scaled(scale)
             }
-            None => self.least_intersecting(ATTEMPTS, |_| true, &mut || self.draw_unfiltered(scale, rng)),
-        }
-    }
-
-    /// The first of at most `attempts` poses of `draw` that is possible and intersects itself no more than the limit, or the one
-    /// that comes nearest to it.
-    fn least_intersecting(
-        &self,
-        attempts: usize,
-        is_possible: fn(&Pose) -> bool,
-        draw: &mut dyn FnMut() -> Pose,
-    ) -> Pose {
-        let limit = self.filter.as_ref().map_or(f64::MAX, |filter| filter.limit);
-        let measured = |pose: Pose| {
-            let length = match is_possible(&pose) {
-                true => self.filter.as_ref().map_or(0.0, |filter| filter.measure(&pose)),
-                false => f64::INFINITY,
-            };
-            (pose, length)
-        };
-        let mut best = measured(draw());
-        for _ in 1..attempts {
-            if best.1 <= limit {
-                break;
-            }
-            let other = measured(draw());
-            if other.1 < best.1 {
-                best = other;
+            None => {
+                let mut draw = || self.draw.unfiltered(scale, rng);
+                self.draw.least_intersecting(DRAWN_ATTEMPTS, |_| true, &mut draw)
             }
         }
-        best.0
-    }
-
-    fn draw_unfiltered(&self, scale: f64, rng: &mut ChaCha8Rng) -> Pose {
-        let pose = match &self.source {
-            Source::Sampler(sampler) => sampler.sample(rng),
-            Source::Frames(frames) => {
-                let pose = frames.sample_training(rng);
-                match &self.augmentation {
-                    Some(augmentation) => {
-                        let other = frames.sample_training(rng);
-                        augmentation.apply(pose, other, rng)
-                    }
-                    None => pose.clone(),
-                }
-            }
-        };
-        self.facing_forward(&pose).scaled(scale)
     }
 
     /// A pose never trained on, as it was captured but for its heading.
@@ -271,28 +170,30 @@ impl PoseLibrary {
     /// # Panics
     /// If there are none of this `kind` ([`has`](Self::has)).
     pub fn sample_held_out(&self, kind: HeldOut, rng: &mut ChaCha8Rng) -> Pose {
-        let pose = match &self.source {
-            Source::Sampler(sampler) => sampler.sample(rng),
-            Source::Frames(frames) => {
+        let pose = match &self.draw.frames {
+            None => self.draw.sampler.sample(rng),
+            Some(frames) => {
                 let pool = frames.held_out(kind);
                 pool[rng.random_range(0..pool.len())].clone()
             }
         };
-        self.facing_forward(&pose)
-    }
-
-    /// The pose as the networks and the body see it: heading removed when the configuration says so.
-    pub fn facing_forward(&self, pose: &Pose) -> Pose {
-        if self.remove_heading { pose.without_heading().0 } else { pose.clone() }
+        self.draw.facing_forward(&pose)
     }
 }
 
-impl Filter {
-    /// Length of the curves of self-intersection (m).
-    fn measure(&self, pose: &Pose) -> f64 {
-        // Only a pose longer than the body's joint list is refused, and those joints are left out.
-        self.contact.of_pose(&self.body, pose).unwrap_or(0.0)
-    }
+fn survey_self_intersections(draw: &PoseDraw) -> Option<SelfIntersecting> {
+    let filter = draw.filter.as_ref()?;
+    let lengths: Vec<f64> = (0..REPORTED_POSES as u64)
+        .into_par_iter()
+        .map(|i| filter.measure(&draw.unfiltered(1.0, &mut ChaCha8Rng::seed_from_u64(i))))
+        .collect();
+    let share = |limit: f64| lengths.iter().filter(|l| **l > limit).count() as f64 / lengths.len() as f64;
+    Some(SelfIntersecting {
+        poses: lengths.len(),
+        touching: share(0.0),
+        above_limit: share(filter.limit),
+        limit: filter.limit,
+    })
 }
 
 #[cfg(test)]

@@ -25,15 +25,11 @@ pub struct Preprocessor {
     pub energy: EnergySettings,
     /// Eigenpairs a garment is described with.
     pub eigen_count: usize,
-    pub(super) cache: Option<GarmentCache>,
-}
-
-/// Bindings, operators and embeddings on disk, by the content of the rest mesh.
-pub(super) struct GarmentCache {
-    arrays: ArrayCache,
-    body: Key,
+    /// Bindings, operators and embeddings on disk, by the content of the rest mesh.
+    cache: Option<ArrayCache>,
+    body_key: Key,
     /// Why something could not be stored; nothing more is stored then.
-    failure: OnceLock<String>,
+    failure: OnceLock<CacheError>,
 }
 
 impl Preprocessor {
@@ -41,6 +37,7 @@ impl Preprocessor {
     pub fn new(config: &Config, body: Arc<Body>) -> Self {
         let start = &config.start;
         Self {
+            body_key: body_key(&body),
             body,
             binding: BindingSettings {
                 smoothing_iterations: start.smoothing_iterations,
@@ -51,13 +48,13 @@ impl Preprocessor {
             energy: config.losses.energy_settings(),
             eigen_count: config.model.eigen_count,
             cache: None,
+            failure: OnceLock::new(),
         }
     }
 
     /// The same with a cache.
-    pub fn with_cache(self, arrays: ArrayCache) -> Self {
-        let body = body_key(&self.body);
-        Self { cache: Some(GarmentCache { arrays, body, failure: OnceLock::new() }), ..self }
+    pub fn with_cache(self, cache: ArrayCache) -> Self {
+        Self { cache: Some(cache), ..self }
     }
 
     /// The same with the cache in `folder`, of at most `limit` bytes; without one, and with a warning, if it cannot be used.
@@ -73,27 +70,23 @@ impl Preprocessor {
 
     /// The cache.
     pub fn cache(&self) -> Option<&ArrayCache> {
-        self.cache.as_ref().map(|cache| &cache.arrays)
+        self.cache.as_ref()
     }
 
     /// Stores something, unless that failed before. A cache only saves time: what cannot be stored is a warning, the first time.
     pub fn store(&self, put: impl FnOnce(&ArrayCache) -> Result<(), CacheError>) {
-        let Some(cache) = self.cache.as_ref().filter(|cache| cache.failure.get().is_none()) else { return };
-        if let Err(error) = put(&cache.arrays) {
-            let mut is_first = false;
-            cache.failure.get_or_init(|| {
-                is_first = true;
-                error.to_string()
-            });
-            if is_first {
-                tracing::warn!("{error}; nothing more is stored");
+        let Some(cache) = self.cache().filter(|_| self.failure.get().is_none()) else { return };
+        if let Err(error) = put(cache) {
+            let warning = format!("{error}; nothing more is stored");
+            if self.failure.set(error).is_ok() {
+                tracing::warn!("{warning}");
             }
         }
     }
 
     /// Why nothing more is stored, if so.
-    pub fn store_failure(&self) -> Option<&str> {
-        self.cache.as_ref()?.failure.get().map(String::as_str)
+    pub fn store_failure(&self) -> Option<&CacheError> {
+        self.failure.get()
     }
 
     /// The binding of a garment whose rest mesh has the key `mesh`: from the cache, or computed and stored there.
@@ -107,10 +100,8 @@ impl Preprocessor {
     /// The largest skin weight of every joint; the binding comes from the cache, or is computed and stored there.
     pub fn largest_weights(&self, garment: &Garment, mesh: Key) -> Vec<f32> {
         let joints = self.body.joint_count();
-        let stored = self.cache.as_ref().and_then(|cache| {
-            get_largest_weights(&cache.arrays, self.binding_key(cache, mesh, garment.category))
-        });
-        match stored {
+        let key = self.binding_key(mesh, garment.category);
+        match self.cache().and_then(|cache| get_largest_weights(cache, key)) {
             Some(largest) if largest.len() == joints => largest,
             _ => self.compute_binding(garment, mesh).largest_weights(joints),
         }
@@ -118,22 +109,18 @@ impl Preprocessor {
 
     fn compute_binding(&self, garment: &Garment, mesh: Key) -> Binding {
         let binding = Binding::new(garment, &self.body, &self.binding);
-        if let Some(cache) = &self.cache {
-            let key = self.binding_key(cache, mesh, garment.category);
-            let joints = self.body.joint_count();
-            self.store(|arrays| put_binding(arrays, key, &garment.rest, &binding, joints));
-        }
+        let (key, joints) = (self.binding_key(mesh, garment.category), self.body.joint_count());
+        self.store(|cache| put_binding(cache, key, &garment.rest, &binding, joints));
         binding
     }
 
     /// The rest mesh and the binding that the cache has of it.
     pub fn stored_binding(&self, mesh: Key, category: Category) -> Option<(TriMesh, Binding)> {
-        let cache = self.cache.as_ref()?;
-        get_binding(&cache.arrays, self.binding_key(cache, mesh, category), self.body.joint_count())
+        get_binding(self.cache()?, self.binding_key(mesh, category), self.body.joint_count())
     }
 
-    fn binding_key(&self, cache: &GarmentCache, mesh: Key, category: Category) -> Key {
-        binding_key(mesh, cache.body, category, &self.binding)
+    fn binding_key(&self, mesh: Key, category: Category) -> Key {
+        binding_key(mesh, self.body_key, category, &self.binding)
     }
 
     /// DiffusionNet's operators of a rest mesh of key `mesh`: from the cache, or computed and stored there.
@@ -165,8 +152,8 @@ impl Preprocessor {
         rest: &TriMesh,
         mesh: Key,
     ) -> Result<SurfaceOperators, DatasetError> {
-        let operators = SurfaceOperators::new(rest, self.eigen_count)
-            .map_err(|e| DatasetError::Garment { name: name.to_owned(), reason: e.to_string() })?;
+        let operators =
+            SurfaceOperators::new(rest, self.eigen_count).map_err(|e| DatasetError::garment(name, e))?;
         self.store(|cache| put_operators(cache, operators_key(mesh, self.eigen_count), &operators));
         Ok(operators)
     }
@@ -190,7 +177,7 @@ impl Preprocessor {
         let material = garment.material.over(&self.energy.material);
         let settings = EnergySettings { material, ..self.energy };
         let energies = GarmentEnergies::new(&garment.rest, &topology, &settings, garment.holding)
-            .map_err(|e| DatasetError::Garment { name: garment.name.clone(), reason: e.to_string() })?;
+            .map_err(|e| DatasetError::garment(&garment.name, e))?;
         Ok(PreparedGarment {
             skin_weights: joints.restrict(&binding.skin_weights),
             shape_directions: binding.shape_directions,

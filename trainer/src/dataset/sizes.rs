@@ -1,7 +1,10 @@
 //! What of its data a run's memory depends on.
 
+use super::body::load_body;
+use super::error::DatasetError;
+use super::garment_source::GarmentSource;
+use super::prepared_garment::PreparedGarment;
 use super::split::{GarmentPurpose, purpose};
-use super::{Dataset, DatasetError, GarmentSource, PreparedGarment, load_body};
 use crate::config::{Config, DataConfig};
 use clothcombo_data::asset::{BODY_JOINT_COUNT, Body};
 use rayon::prelude::*;
@@ -27,7 +30,7 @@ pub struct DataSizes {
 const SMPL_X: [usize; 3] = [10_475, 20_908, 55];
 
 /// Whether garments that are kept for the final test are loaded, too: without a cache all are.
-fn reads_tests(config: &DataConfig) -> bool {
+pub(super) fn reads_tests(config: &DataConfig) -> bool {
     config.cache.folder.is_none()
 }
 
@@ -35,15 +38,6 @@ fn reads_tests(config: &DataConfig) -> bool {
 const GARMENT_INFO: usize = 1536;
 
 impl DataSizes {
-    /// Those of data that `config` names and that is loaded.
-    pub fn of(dataset: &Dataset, config: &DataConfig) -> Self {
-        let split = &dataset.split;
-        let tests = if reads_tests(config) { &split.test[..] } else { &[] };
-        let read = split.training.iter().chain(&split.validation).chain(tests);
-        let vertices = read.map(|i| dataset.garments.info(*i).vertices).collect();
-        Self { joints: dataset.joints().len(), ..Self::of_body(vertices, &dataset.body) }
-    }
-
     /// Those of the data that `config` names. Meshes are read for their number of vertices, nothing is computed.
     ///
     /// # Errors
@@ -79,7 +73,8 @@ impl DataSizes {
         }
     }
 
-    fn of_body(vertices: Vec<usize>, body: &Body) -> Self {
+    /// Those of garments of so many `vertices` on `body`.
+    pub(super) fn of_body(vertices: Vec<usize>, body: &Body) -> Self {
         Self {
             vertices,
             // Hands and face carry no garment.

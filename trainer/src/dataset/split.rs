@@ -1,9 +1,7 @@
 //! Which garments are trained on, which only validate, and which are kept for the final test.
 
 use super::error::DatasetError;
-use super::poses::Window;
 use crate::config::DataConfig;
-use serde::Serialize;
 
 /// Garments by what they are for; indices into the dataset, ascending.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,8 +23,10 @@ impl GarmentSplit {
     pub fn new(names: &[&str], config: &DataConfig) -> Result<Self, DatasetError> {
         let held_out = &config.held_out_garments;
         if let Some(name) = held_out.iter().find(|n| !names.contains(&n.as_str())) {
-            let available = names.join(", ");
-            return Err(DatasetError::UnknownHeldOut { name: name.clone(), available });
+            return Err(DatasetError::new(
+                format!("data.held_out_garments names {name:?}, which is no garment of this run"),
+                format!("the garments are: {}", names.join(", ")),
+            ));
         }
         let mut split = Self { training: Vec::new(), validation: Vec::new(), test: Vec::new() };
         for (i, &name) in names.iter().enumerate() {
@@ -38,7 +38,10 @@ impl GarmentSplit {
             part.push(i);
         }
         match split.training.is_empty() {
-            true => Err(DatasetError::AllHeldOut(names.len())),
+            true => Err(DatasetError::new(
+                format!("all {} garments are held out, none is left to train on", names.len()),
+                "shorten data.held_out_garments",
+            )),
             false => Ok(split),
         }
     }
@@ -63,25 +66,6 @@ pub fn purpose(name: &str, config: &DataConfig) -> GarmentPurpose {
         place if place < config.split.validation => GarmentPurpose::Validation,
         _ => GarmentPurpose::Training,
     }
-}
-
-/// The split of a run by name.
-#[derive(Clone, Debug, Serialize)]
-pub struct SplitNames {
-    /// Garments trained on.
-    pub training_garments: Vec<String>,
-    /// Garments scored during the run, never trained on.
-    pub validation_garments: Vec<String>,
-    /// Garments neither trained on nor scored during the run.
-    pub test_garments: Vec<String>,
-    /// Motion clips trained on, but for the windows held out of them and the margins around those.
-    pub training_clips: Vec<String>,
-    /// Windows held out of those clips, and short clips held out whole, scored during the run.
-    pub validation_windows: Vec<Window>,
-    /// Motion clips scored during the run, never trained on.
-    pub validation_clips: Vec<String>,
-    /// Motion clips neither trained on nor scored during the run.
-    pub test_clips: Vec<String>,
 }
 
 /// A number in [0, 1) that depends on the name alone.
@@ -124,6 +108,6 @@ mod tests {
         let unknown = GarmentSplit::new(&names, &config(0.0, 0.0, &["d"])).unwrap_err();
         assert!(unknown.to_string().contains("\"d\""));
         let none = GarmentSplit::new(&names, &config(0.0, 0.0, &names)).unwrap_err();
-        assert!(matches!(none, DatasetError::AllHeldOut(3)));
+        assert!(none.to_string().contains("all 3 garments are held out"), "{none}");
     }
 }

@@ -2,7 +2,6 @@
 
 use super::{Evaluator, Section, Table};
 use crate::inference::Draped;
-use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::networks::drape_on;
 use crate::inference::on_body::OnBody;
 use crate::run::report::table::{Column, median_and_p95, plain};
@@ -54,7 +53,7 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
         let _ = Draped::of(single.last());
         let single = clock.elapsed();
         let on_body = OnBody { scene: &scene, outfit: &outfit, embeddings: &embeddings, body: &body, start };
-        let (draped, networks) = drape_on(&model.model, &on_body, LayerInteraction::Together);
+        let (draped, networks) = drape_on(&model.model, &on_body, Mode::Layered);
         let resolved = post_process.of(&scene, &draped.posed).resolved(settings)?;
         if index > 0 {
             // The body's preparation is part of the garments' time only where a continuation path needs it again.

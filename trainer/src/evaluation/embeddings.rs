@@ -3,7 +3,6 @@
 use super::{Evaluator, GarmentSet, PAPER_COLLISION, Scenes, Section, Table, estimates};
 use crate::dataset::{HeldOut, PreparedScene};
 use crate::inference::Draped;
-use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::networks::forward_on;
 use crate::inference::on_body::OnBody;
 use crate::inference::tensor_store::DrapeError;
@@ -64,7 +63,7 @@ fn evaluate(evaluator: &Evaluator<'_>, scenes: &Scenes) -> Result<Value, DrapeEr
             let embeddings = model.model.pack(&outfit, std::slice::from_ref(embedding), Mode::Layered)?;
             let (outfit, body, start) = (&outfit, &body, start.clone());
             let on_body = OnBody { scene, outfit, embeddings: &embeddings, body, start };
-            Ok(forward_on(&model.model, &on_body, LayerInteraction::Together).1)
+            Ok(forward_on(&model.model, &on_body, Mode::Layered).1)
         };
         kinds.iter().map(drape).collect()
     };

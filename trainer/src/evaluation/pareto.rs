@@ -6,7 +6,6 @@ use super::timing::{REPETITION_SECONDS, median_ms};
 use super::{Estimate, Evaluator, Metric, Section, Table, drape_by};
 use crate::dataset::PreparedScene;
 use crate::inference::Draped;
-use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::reference::{ReferenceScene, wide};
 use crate::inference::tensor_store::DrapeError;
 use crate::inference::{RefineSteps, refine};
@@ -15,6 +14,7 @@ use crate::picture::png_bytes;
 use crate::run::report::table::{Column, median_with_interval, plain};
 use crate::run::validation::Method;
 use crate::system::single_threaded::map_single_threaded;
+use clothcombo_model::Mode;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::equilibrium::{Problem, SolverSettings, Stop, solve};
 use miette::{IntoDiagnostic, Report};
@@ -193,8 +193,7 @@ fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<
     };
     let by = |method: Method| timed(method.name(), &|| Ok(drape_by(networks, &[method], scene)?.remove(0)));
     let mut states = vec![by(Method::Lbs)?, by(Method::LbsWithShapeTransfer)?];
-    let forward = || networks.forward(scene, LayerInteraction::Together);
-    states.push(timed("network, forward pass", &forward)?);
+    states.push(timed("network, forward pass", &|| networks.forward(scene, Mode::Layered))?);
     let network = by(Method::Network)?;
     let draped = networks.drape(scene)?;
     // Once: it may take seconds.

@@ -1,7 +1,7 @@
 //! How smoothly a motion moves: accelerations of the garments' vertices beside those of linear blend skinning.
 
-use super::Moment;
-use super::{Drape, GarmentDrape};
+use super::bodies::Moment;
+use super::drape::{Drape, GarmentDrape};
 use crate::run::spread::Spread;
 use serde::{Deserialize, Serialize};
 

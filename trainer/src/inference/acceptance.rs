@@ -9,22 +9,27 @@
 //!
 //! So no outfit ends above either skinning, and no garment above what it began with.
 
-use super::descent::{BACKTRACKING, Descent, WHOLE};
+use super::descent::{BACKTRACKING, Descent, WHOLE_STEP};
 use super::draped::{Draped, to_device};
-use super::layer_interaction::LayerInteraction;
 use super::on_body::OnBody;
 use burn::tensor::Tensor;
-use clothcombo_model::{BodyTensors, DrapeState, OutfitTensors, linear_blend_skinning};
+use clothcombo_model::{BodyTensors, DrapeState, Mode, OutfitTensors, linear_blend_skinning};
 
 /// The state that the networks' drape `proposed` leads to, whose skin weights are `skin_weights` `[ΣV, J]`.
 pub(crate) fn accepted(
     on_body: &OnBody<'_>,
     proposed: &Draped,
     skin_weights: &Tensor<2>,
-    interaction: LayerInteraction,
+    mode: Mode,
 ) -> Draped {
     let OnBody { scene, outfit, body, start, .. } = on_body;
-    let energy = interaction.energy(scene).continuous().pulled_back(&scene.skinning_transforms());
+    let energy = &scene.bodies[0].energy;
+    // The losses of the pairs count where garments interact.
+    let energy = match mode {
+        Mode::Single => energy.without_layers(),
+        Mode::Layered => (**energy).clone(),
+    };
+    let energy = energy.continuous().pulled_back(&scene.skinning_transforms());
     let skinnings = [start, &outfit.rest].map(|x| skinned(x.clone(), outfit.skin_weights.clone(), body));
     let mut descent = Descent::from_best(&energy, skinnings);
     take_networks(&mut descent, proposed, skin_weights, outfit, body);
@@ -40,7 +45,7 @@ fn take_networks(
     body: &BodyTensors,
 ) {
     let device = &skin_weights.device();
-    let shares = descent.advance(proposed, &WHOLE);
+    let shares = descent.advance(proposed, &WHOLE_STEP);
     let stayed = |garment: usize| shares[garment] == 0.0;
     if !(0..shares.len()).any(stayed) {
         return;

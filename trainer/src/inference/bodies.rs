@@ -1,14 +1,33 @@
 //! The bodies of a drape: one pose, the frames of a motion, or a posed mesh.
 
-use super::error::DraperError;
-use super::warnings::{check_poses, warn_about_shape};
-use super::{BodyState, Drape, DrapeProgress, Draper, Outfit, Smoothing, smooth};
 use crate::dataset::DatasetError;
 use clothcombo_data::asset::{Body, KnownShape, Motion, Pose, recover_body};
-use clothcombo_data::generate::named_pose;
+use clothcombo_data::generate::{POSE_NAMES, named_pose};
+use miette::{Report, miette};
 use serde::Serialize;
 use std::path::Path;
 use std::str::FromStr;
+
+/// A body to be dressed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyState {
+    /// Shape parameters β; missing ones are 0.
+    pub shape: Vec<f64>,
+    /// Pose θ.
+    pub pose: Pose,
+    /// The posed surface `[V, 3]` (m) that counts for contact, where it is known better than by shape and pose: a scan, or
+    /// another program's correctives.
+    pub surface: Option<Vec<[f64; 3]>>,
+    /// Where its pelvis stands (m); `surface` is there already.
+    pub place: [f64; 3],
+}
+
+impl BodyState {
+    /// The body model's own surface at this shape and pose.
+    pub fn new(shape: Vec<f64>, pose: Pose) -> Self {
+        Self { shape, pose, surface: None, place: [0.0; 3] }
+    }
+}
 
 /// Bodies to be dressed one after the other.
 #[derive(Clone, Debug)]
@@ -93,12 +112,12 @@ impl Bodies {
         name: &str,
         frames: FrameRange,
         every: usize,
-    ) -> Result<Self, DraperError> {
+    ) -> Result<Self, Report> {
         let count = motion.poses.len();
         let end = frames.end.unwrap_or(count);
         if frames.first >= count || end > count {
             let frame = frames.first.max(end.saturating_sub(1));
-            return Err(DraperError::NoFrame { of: name.to_owned(), frame, count });
+            return Err(no_frame(name, frame, count));
         }
         let frames = (frames.first..end).step_by(every.max(1));
         let (states, moments) = frames
@@ -120,26 +139,17 @@ impl Bodies {
         surface: Vec<[f64; 3]>,
         known: KnownShape,
         name: &str,
-    ) -> Result<Self, DraperError> {
-        let found = recover_body(body, known, &surface)
-            .map_err(|e| DraperError::Recover { of: name.to_owned(), reason: e.to_string() })?;
+    ) -> Result<Self, Report> {
+        check_body_mesh(body, name, &surface)?;
+        if let KnownShape::TPose(rest) = known {
+            check_body_mesh(body, "the body in T-pose", rest)?;
+        }
+        let found = recover_body(body, known, &surface).map_err(|reason| no_body_mesh(name, &reason))?;
         let recovered_within_mm = Some(1e3 * found.mean_distance);
         let report = BodyReport { recovered_within_mm, ..report(body, &found.shape, name) };
         let state =
             BodyState { shape: found.shape, pose: found.pose, surface: Some(surface), place: found.place };
         Ok(Self { states: vec![state], moments: Vec::new(), report })
-    }
-
-    /// Whether `draper` can dress them; what is unusual about them is logged as a warning.
-    ///
-    /// # Errors
-    /// When shape, pose or surface do not fit its body, or angles cannot be in radians.
-    pub fn check(&self, draper: &Draper) -> Result<(), DraperError> {
-        // The frames of a motion are alike in what may be wrong with them.
-        self.states.first().map_or(Ok(()), |state| draper.check_body(state))?;
-        warn_about_shape(&self.report.shape, draper.trained().config.data.shape_range);
-        let poses: Vec<Pose> = self.states.iter().map(|state| state.pose.clone()).collect();
-        check_poses(&poses, &self.report.pose)
     }
 }
 
@@ -152,6 +162,57 @@ fn report(body: &Body, shape: &[f64], pose: &str) -> BodyReport {
         triangles: body.faces.len(),
         recovered_within_mm: None,
     }
+}
+
+/// A body mesh so many times as large as the body model, or as small, is in another unit.
+const RESCALED: f64 = 3.0;
+
+/// The post-process takes what is within a kilometre of the origin; garments stand away from the body (m).
+const FARTHEST_BODY: f64 = 900.0;
+
+/// Whether `positions` can be those of a mesh of `body`, in metres; errors say that it is `of`.
+///
+/// # Errors
+/// When they cannot.
+pub fn check_body_mesh(body: &Body, of: &str, positions: &[[f64; 3]]) -> Result<(), Report> {
+    let (found, expected) = (positions.len(), body.vertex_count());
+    if found != expected {
+        let reason = format!("the mesh has {found} vertices, body '{}' has {expected}", body.name);
+        return Err(no_body_mesh(of, &reason));
+    }
+    let [own, model] = [positions, &body.template].map(extent);
+    if own > RESCALED * model || model > RESCALED * own {
+        let reason = format!("the mesh measures {own:.3} from end to end, body '{}' {model:.3}", body.name);
+        return Err(no_body_mesh(of, &reason));
+    }
+    // Not a number is nowhere.
+    match positions.iter().position(|p| !p.iter().all(|x| x.abs() <= FARTHEST_BODY)) {
+        None => Ok(()),
+        Some(vertex) => {
+            let place = positions[vertex];
+            let reason = format!(
+                "vertex {vertex} (from 0) is at {place:?}, not within {FARTHEST_BODY} m of the origin"
+            );
+            Err(no_body_mesh(of, &reason))
+        }
+    }
+}
+
+/// The longest side of the box around `positions`.
+fn extent(positions: &[[f64; 3]]) -> f64 {
+    let side = |axis: usize| {
+        let along = || positions.iter().map(|p| p[axis]);
+        along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
+    };
+    (0..3).map(side).fold(0.0, f64::max)
+}
+
+fn no_body_mesh(of: &str, reason: &dyn std::fmt::Display) -> Report {
+    miette!(
+        help = "the mesh must be a pose of the body model: the same vertices in the same order, metres, y up; and its shape \
+                known, by --t-pose or --shape",
+        "{of}: {reason}"
+    )
 }
 
 /// The parts of `FILE.npz` or `FILE.npz:FRAME`.
@@ -172,56 +233,33 @@ pub fn file_and_frame(text: &str) -> (&str, &str) {
 ///
 /// # Errors
 /// When there is neither.
-pub fn read_pose(text: &str) -> Result<Pose, DraperError> {
+pub fn read_pose(text: &str) -> Result<Pose, Report> {
     let (path, frame) = file_and_frame(text);
     if !Path::new(path).exists() {
         // A word without a dot or a slash is a name, not a file that happens to be missing.
         let is_name = !text.contains('/') && Path::new(path).extension().is_none();
         match named_pose(text) {
             Some(pose) => return Ok(pose),
-            None if is_name => return Err(DraperError::UnknownPose { text: text.to_owned() }),
+            None if is_name => {
+                let names = POSE_NAMES.join(", ");
+                return Err(miette!(
+                    help = format!("its names: {names}; or give a frame of a motion file, FILE.npz:FRAME"),
+                    "--pose {text}: neither a file nor the name of a pose"
+                ));
+            }
             None => {}
         }
     }
-    let number = frame
-        .parse()
-        .map_err(|_| DraperError::FrameNumber { text: text.to_owned(), frame: frame.to_owned() })?;
+    let number = frame.parse().map_err(|_| miette!("--pose {text}: {frame:?} is no number of a frame"))?;
     let motion = Motion::load(Path::new(path)).map_err(DatasetError::data)?;
     let count = motion.poses.len();
     let pose = motion.poses.into_iter().nth(number);
-    pose.ok_or_else(|| DraperError::NoFrame { of: path.to_owned(), frame: number, count })
+    pose.ok_or_else(|| no_frame(path, number, count))
 }
 
-/// Frames this near to each other show the same cloth (s); a little more than 0.05, for rounding.
-const CLOSE_FRAMES: f64 = 0.050_001;
-
-/// Frames to each side over which a motion is smoothed: where nothing else is asked for, two of frames that are
-/// [close](CLOSE_FRAMES), so that only what trembles is averaged.
-fn smoothing_radius(asked: Option<u16>, moments: &[Moment]) -> usize {
-    let is_close = |pair: &[Moment]| pair[1].seconds - pair[0].seconds <= CLOSE_FRAMES;
-    let usual = if moments.windows(2).all(is_close) { 2 } else { 0 };
-    asked.map_or(usual, usize::from)
-}
-
-impl Draper {
-    /// Drapes `outfit` on all of `bodies`, as [`drape_motion`](Self::drape_motion). A motion is smoothed over `radius` frames to
-    /// each side; `None`: over two where they are at most 0.05 s apart, else not.
-    ///
-    /// # Errors
-    /// When shape or pose do not fit the body model, or the networks diverge.
-    pub fn drape_bodies(
-        &self,
-        outfit: &Outfit,
-        bodies: &Bodies,
-        radius: Option<u16>,
-        progress: impl FnMut(DrapeProgress),
-    ) -> Result<(Vec<Drape>, Option<Smoothing>), DraperError> {
-        let radius = smoothing_radius(radius, &bodies.moments);
-        let mut drapes = self.drape_motion(outfit, &bodies.states, radius, progress)?;
-        let is_smoothed = radius > 0 && !bodies.moments.is_empty();
-        let smoothing = is_smoothed.then(|| smooth(self, outfit, &mut drapes, radius)).transpose()?;
-        Ok((drapes, smoothing))
-    }
+fn no_frame(of: &str, frame: usize, count: usize) -> Report {
+    let help = if count == 0 { "export it again with its poses" } else { "frames count from 0" };
+    miette!(help = help, "{of} has {count} frames, no frame {frame}")
 }
 
 #[cfg(test)]
@@ -239,17 +277,5 @@ mod tests {
         for wrong in ["", "7", "9..3", "4..4", "a..b", "-1..4"] {
             assert!(range(wrong).is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn frames_far_from_each_other_are_only_smoothed_if_asked_for() {
-        let moments = |rate: f64| -> Vec<Moment> {
-            (0..5).map(|frame| Moment { frame, seconds: frame as f64 / rate }).collect()
-        };
-        assert_eq!(
-            [60.0, 30.0, 20.0, 19.0, 3.0].map(|rate| smoothing_radius(None, &moments(rate))),
-            [2, 2, 2, 0, 0]
-        );
-        assert_eq!([0, 3].map(|asked| smoothing_radius(Some(asked), &moments(3.0))), [0, 3]);
     }
 }

@@ -14,17 +14,13 @@ use std::collections::BTreeSet;
 /// Backtracking: a step that goes too far along a direction that is right is halved, and halved again.
 pub const BACKTRACKING: [f32; 3] = [1.0, 0.5, 0.25];
 /// All of it or nothing, for a proposal that is a place rather than a direction.
-pub const WHOLE: [f32; 1] = [1.0];
+pub const WHOLE_STEP: [f32; 1] = [1.0];
 
 /// A state of an outfit whose energies only fall.
 pub struct Descent<'a> {
     energy: &'a SceneEnergy<f32>,
     state: Draped,
-    energies: Vec<f64>,
-    /// What every garment has of the outfit's energy: half of that of its pairs.
-    shares_of_total: Vec<f64>,
-    /// Of the whole outfit, in which every pair counts once.
-    total: f64,
+    reached: StateEnergies,
     /// For every garment the first of those that pairs connect it with.
     group: Vec<usize>,
 }
@@ -32,13 +28,13 @@ pub struct Descent<'a> {
 impl<'a> Descent<'a> {
     /// Starts from `state`.
     pub fn new(energy: &'a SceneEnergy<f32>, state: Draped) -> Self {
-        let Measured { energies, shares_of_total, total } = measured(energy, &state);
-        let mut group: Vec<usize> = (0..energies.len()).collect();
+        let reached = measured(energy, &state);
+        let mut group: Vec<usize> = (0..reached.energies.len()).collect();
         for pair in &energy.layers {
             let [from, to] = [pair.inner, pair.outer].map(|garment| group[garment]);
             group.iter_mut().filter(|g| **g == from.max(to)).for_each(|g| *g = from.min(to));
         }
-        Self { energy, state, energies, shares_of_total, total, group }
+        Self { energy, state, reached, group }
     }
 
     /// Starts from the one of `candidates` in which the outfit has least energy. A garment that has less in another one goes
@@ -49,11 +45,11 @@ impl<'a> Descent<'a> {
     /// If there is none.
     pub fn from_best(energy: &'a SceneEnergy<f32>, candidates: impl IntoIterator<Item = Draped>) -> Self {
         let mut starts: Vec<Self> = candidates.into_iter().map(|state| Self::new(energy, state)).collect();
-        let lowest = (0..starts.len()).min_by(|&a, &b| starts[a].total.total_cmp(&starts[b].total));
+        let lowest = (0..starts.len()).min_by(|&a, &b| starts[a].total().total_cmp(&starts[b].total()));
         let mut best = starts.remove(lowest.expect("a state to start from"));
         for other in starts {
-            let gains: Vec<bool> = other.energies.iter().zip(&best.energies).map(|(o, b)| o < b).collect();
-            best.advance_some(&other.state, &WHOLE, |garment| gains[garment]);
+            let gains: Vec<bool> = other.energies().iter().zip(best.energies()).map(|(o, b)| o < b).collect();
+            best.advance_some(&other.state, &WHOLE_STEP, |garment| gains[garment]);
         }
         best
     }
@@ -65,12 +61,12 @@ impl<'a> Descent<'a> {
 
     /// Energy of every garment with the pairs that it is part of (J); infinite where it is not finite.
     pub fn energies(&self) -> &[f64] {
-        &self.energies
+        &self.reached.energies
     }
 
     /// Energy of the outfit (J); infinite where it is not finite.
     pub fn total(&self) -> f64 {
-        self.total
+        self.reached.total
     }
 
     /// The state that was reached.
@@ -99,13 +95,13 @@ impl<'a> Descent<'a> {
     ) -> Vec<f32> {
         // Which share every garment takes; one behind the last stands still.
         let mut taken: Vec<usize> =
-            (0..self.energies.len()).map(|i| if may_move(i) { 0 } else { shares.len() }).collect();
+            (0..self.group.len()).map(|i| if may_move(i) { 0 } else { shares.len() }).collect();
         let share = |taken: usize| shares.get(taken).copied().unwrap_or(0.0);
         while taken.iter().any(|s| *s < shares.len()) {
             let trial = self.between(proposal, |i| share(taken[i]));
-            let Measured { energies, shares_of_total, total } = measured(self.energy, &trial);
+            let found = measured(self.energy, &trial);
             let moves = |i: usize| taken[i] < shares.len();
-            let rose = (0..taken.len()).filter(|&i| energies[i] > self.energies[i]);
+            let rose = (0..taken.len()).filter(|&i| found.energies[i] > self.reached.energies[i]);
             let mut shorter: BTreeSet<usize> = rose.flat_map(|i| self.shortened(i, moves)).collect();
             if shorter.is_empty() {
                 // What garments win from each other counts twice for them, what they pay for it once. Those that no chain of
@@ -115,16 +111,15 @@ impl<'a> Descent<'a> {
                     self.group.iter().zip(totals).for_each(|(group, energy)| sums[*group] += energy);
                     sums
                 };
-                let (new, old) = (of(&shares_of_total), of(&self.shares_of_total));
+                let (new, old) = (of(&found.shares_of_total), of(&self.reached.shares_of_total));
                 shorter.extend(
                     (0..taken.len()).filter(|&i| moves(i) && new[self.group[i]] > old[self.group[i]]),
                 );
             }
             if shorter.is_empty() {
                 // Infinite energies neither rise nor fall.
-                if energies.iter().zip(&self.energies).any(|(new, old)| new < old) {
-                    (self.state, self.energies, self.total) = (trial, energies, total);
-                    self.shares_of_total = shares_of_total;
+                if found.energies.iter().zip(self.energies()).any(|(new, old)| new < old) {
+                    (self.state, self.reached) = (trial, found);
                     return taken.into_iter().map(share).collect();
                 }
                 break;
@@ -167,14 +162,17 @@ impl<'a> Descent<'a> {
 }
 
 /// Energies of a state (J); infinite where they are not finite.
-struct Measured {
+struct StateEnergies {
+    /// Of every garment, with the pairs that it is part of.
     energies: Vec<f64>,
+    /// What every garment has of the outfit's energy: half of that of its pairs.
     shares_of_total: Vec<f64>,
+    /// Of the whole outfit, in which every pair counts once.
     total: f64,
 }
 
 /// Weighted energy of every garment, its own terms and those of every pair that it is part of; and of the outfit.
-fn measured(energy: &SceneEnergy<f32>, state: &Draped) -> Measured {
+fn measured(energy: &SceneEnergy<f32>, state: &Draped) -> StateEnergies {
     let value = energy.value(&state.posed, &state.canonical);
     let own = energy.garments.iter().zip(&value.garments);
     let mut energies: Vec<f64> = own.map(|(garment, raw)| weighted(&garment.weights, raw)).collect();
@@ -187,7 +185,7 @@ fn measured(energy: &SceneEnergy<f32>, state: &Draped) -> Measured {
         }
     }
     let bounded = |e: f64| if e.is_finite() { e } else { f64::INFINITY };
-    Measured {
+    StateEnergies {
         energies: energies.into_iter().map(bounded).collect(),
         shares_of_total: shares.into_iter().map(bounded).collect(),
         total: bounded(value.total),
@@ -274,11 +272,11 @@ mod tests {
         let (energy, rest) = scene(&[0.1, 0.12], &[]);
         let start = stretched(&rest, &[1.1, 1.1]);
         let mut descent = Descent::new(&energy, start.clone());
-        assert_eq!(descent.advance(&stretched(&rest, &[0.7, 1.2]), &WHOLE), [0.0, 0.0]);
+        assert_eq!(descent.advance(&stretched(&rest, &[0.7, 1.2]), &WHOLE_STEP), [0.0, 0.0]);
         assert_eq!(descent.state().posed, start.posed);
-        assert_eq!(descent.advance(&stretched(&rest, &[0.7, 1.05]), &WHOLE), [0.0, 1.0]);
+        assert_eq!(descent.advance(&stretched(&rest, &[0.7, 1.05]), &WHOLE_STEP), [0.0, 1.0]);
         assert_eq!(descent.state().posed, stretched(&rest, &[1.1, 1.05]).posed);
-        assert_eq!(descent.advance_some(&stretched(&rest, &[1.0, 1.0]), &WHOLE, |i| i == 0), [1.0, 0.0]);
+        assert_eq!(descent.advance_some(&stretched(&rest, &[1.0, 1.0]), &WHOLE_STEP, |i| i == 0), [1.0, 0.0]);
         assert_eq!(descent.state().posed, stretched(&rest, &[1.0, 1.05]).posed);
     }
 
@@ -330,7 +328,7 @@ mod tests {
         let mut descent = Descent::new(&energy, start);
         let (energies, total) = (descent.energies().to_vec(), descent.total());
         assert!(Descent::new(&energy, apart.clone()).energies().iter().zip(&energies).all(|(a, b)| a < b));
-        assert_eq!(descent.advance(&apart, &WHOLE), [0.0, 0.0]);
+        assert_eq!(descent.advance(&apart, &WHOLE_STEP), [0.0, 0.0]);
         descent.advance(&apart, &BACKTRACKING);
         assert!(descent.total() <= total);
         // A third tube that no pair connects goes all the way.
@@ -338,7 +336,7 @@ mod tests {
         three.layers[0].weights = energy.layers[0].weights;
         let mut descent = Descent::new(&three, stretched(&rest, &[1.0, 1.0, 1.1]));
         let proposal = stretched(&rest, &[0.96, 1.04, 1.09]);
-        assert_eq!(descent.advance(&proposal, &WHOLE), [0.0, 0.0, 1.0]);
+        assert_eq!(descent.advance(&proposal, &WHOLE_STEP), [0.0, 0.0, 1.0]);
     }
 
     #[test]

@@ -1,9 +1,13 @@
 //! An outfit on one body: what a draper made, sample by sample.
 
-use super::{Draper, DraperError, Outfit, PhaseTimes, Refinement};
+use super::draper::Draper;
+use super::outfit::Outfit;
+use super::phase_times::PhaseTimes;
+use super::refine::Refinement;
 use clothcombo_physics::Surface;
 use clothcombo_physics::contact::resolve::{Certificate, ContactState, certify};
 use clothcombo_physics::transform::Transform;
+use miette::Report;
 use std::sync::Arc;
 
 /// One garment on one body, vertices as in its [`OutfitGarment`](super::OutfitGarment).
@@ -70,21 +74,18 @@ impl Drape {
     }
 
     /// What intersected before the post-process.
-    pub(super) fn certificate_before(
-        &self,
-        draper: &Draper,
-        outfit: &Outfit,
-    ) -> Result<Certificate, DraperError> {
-        Ok(certify(&self.surface(draper), &outfit.layers(&self.network()))?)
+    pub(super) fn certificate_before(&self, draper: &Draper, outfit: &Outfit) -> Result<Certificate, Report> {
+        let layers = outfit.layers(&self.network());
+        certify(&self.surface(draper), &layers).map_err(|error| outfit.named(error))
     }
 
     /// Brings the positions to what files hold, and counts what intersects there.
-    pub(super) fn settle(&mut self, draper: &Draper, outfit: &Outfit) -> Result<(), DraperError> {
+    pub(super) fn settle(&mut self, draper: &Draper, outfit: &Outfit) -> Result<(), Report> {
         self.garments.iter_mut().for_each(|garment| round(&mut garment.positions));
         let before = self.network();
         let after: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.positions.as_slice()).collect();
         let certified = certify(&self.surface(draper), &outfit.layers(&after));
-        let mut certificate = certified.map_err(|error| outfit.named(error.into()))?;
+        let mut certificate = certified.map_err(|error| outfit.named(error))?;
         certificate.compare_strain(&outfit.layers(&before));
         certificate.is_stopped = self.certificate.is_stopped;
         self.certificate = certificate;

@@ -1,13 +1,18 @@
 //! One drape: networks, post-process, refinement.
 
-use super::motion::RetryPolicy;
+use super::bodies::BodyState;
+use super::drape::{Drape, GarmentDrape};
+use super::draper::Draper;
 use super::network_drape::NetworkDrape;
-use super::{
-    BodyState, Certificate, Drape, Draper, DraperError, GarmentDrape, Outfit, RefineSteps, elapsed, refine,
+use super::outfit::Outfit;
+use super::phase_times::elapsed;
+use super::reference::ReferenceScene;
+use super::refine::{RefineSteps, refine};
+use clothcombo_physics::contact::resolve::{
+    Certificate, ResolveError, Resolved, resolve_after, resolve_along,
 };
-use crate::inference::reference::ReferenceScene;
-use clothcombo_physics::contact::resolve::{Resolved, resolve_after, resolve_along};
 use clothcombo_physics::vec3::{add_scaled, sub};
+use miette::{IntoDiagnostic, Report, miette};
 use std::time::Instant;
 
 /// What is to be draped.
@@ -29,7 +34,54 @@ pub(super) struct PreviousFrame<'a> {
     pub retry: RetryPolicy,
 }
 
+/// Flaws that carrying on from another frame may leave.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RetryPolicy {
+    intersections: usize,
+    excess_strain: usize,
+}
+
+impl RetryPolicy {
+    /// None at all.
+    pub const NONE: Self = Self { intersections: 0, excess_strain: 0 };
+    /// Any.
+    pub const ALL: Self = Self { intersections: usize::MAX, excess_strain: usize::MAX };
+
+    /// After a frame of which starting anew left these: excess strain must not grow from frame to frame.
+    pub fn after(anew: &Certificate) -> Self {
+        Self { intersections: usize::MAX, excess_strain: anew.excess_strain().saturating_add(1) }
+    }
+
+    pub fn is_met(self, certificate: &Certificate) -> bool {
+        certificate.intersections() <= self.intersections && certificate.excess_strain() <= self.excess_strain
+    }
+}
+
+/// Why a frame cannot be resolved.
+enum PathError {
+    /// A pose on its path cannot be draped.
+    Sample(Report),
+    /// The post-process refuses it.
+    Resolve(ResolveError),
+}
+
+impl From<ResolveError> for PathError {
+    fn from(error: ResolveError) -> Self {
+        Self::Resolve(error)
+    }
+}
+
 impl Draper {
+    /// Drapes `outfit` on `body`.
+    ///
+    /// # Errors
+    /// When shape or pose do not fit the body model, or the networks diverge.
+    pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, Report> {
+        let made = self.network_drape(outfit, body)?;
+        let refine = self.refine_steps(1);
+        self.drape_frame(outfit, Frame { body, refine, last: None }, made, &mut |_| ())
+    }
+
     /// Steps of the refinement of each of so many frames.
     pub(super) fn refine_steps(&self, frames: usize) -> RefineSteps {
         self.settings.refine.unwrap_or_else(|| RefineSteps::default_of(frames))
@@ -43,12 +95,15 @@ impl Draper {
         frame: Frame<'_>,
         made: NetworkDrape,
         watch: &mut dyn FnMut(f64),
-    ) -> Result<Drape, DraperError> {
+    ) -> Result<Drape, Report> {
         let mut milliseconds = made.milliseconds;
         let clock = Instant::now();
         let (resolved, times, certificate) = match self.settings.resolve {
             true => {
-                let done = self.resolved(outfit, frame, &made, watch).map_err(|error| outfit.named(error))?;
+                let done = self.resolved(outfit, frame, &made, watch).map_err(|error| match error {
+                    PathError::Sample(report) => report,
+                    PathError::Resolve(error) => outfit.named(error),
+                })?;
                 let times = done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect();
                 (done.positions, times, done.certificate)
             }
@@ -62,10 +117,12 @@ impl Draper {
         let (positions, resolved, refinement) = match frame.refine {
             RefineSteps::AtMost(0) => (resolved, None, None),
             steps => {
-                let mut energy = ReferenceScene::new(&self.trained.config.losses, &made.start.scene)?.energy;
+                let scene = ReferenceScene::new(&self.trained.config.losses, &made.start.scene);
+                let mut energy = scene.into_diagnostic()?.energy;
                 energy.body = made.start.surface.clone();
                 let energy = energy.pulled_back(&made.start.transforms);
-                let (refined, done) = refine(&energy, &resolved.concat(), steps)?;
+                let (refined, done) = refine(&energy, &resolved.concat(), steps)
+                    .map_err(|error| miette!("refinement: {error}"))?;
                 (outfit.to_parts(&refined), Some(resolved), Some(done))
             }
         };
@@ -104,7 +161,7 @@ impl Draper {
         Frame { body, last, .. }: Frame<'_>,
         made: &NetworkDrape,
         watch: &mut dyn FnMut(f64),
-    ) -> Result<Resolved, DraperError> {
+    ) -> Result<Resolved, PathError> {
         let (surface, settings) = (&*made.start.surface, &self.settings.post_process);
         let layers = outfit.layers(&outfit.split(&made.network));
         // Another pose on a path; the surface is given for the end only.
@@ -114,11 +171,12 @@ impl Draper {
             let between = |share: f64| {
                 watch(share);
                 match share {
-                    1.0 => Ok::<_, DraperError>(made.sample(outfit)),
+                    1.0 => Ok::<_, PathError>(made.sample(outfit)),
                     _ => {
                         let place = add_scaled(state.place, share, sub(body.place, state.place));
                         let between = at(state.pose.between(&body.pose, share), place);
-                        Ok(self.network_drape(outfit, &between)?.sample(outfit))
+                        let made = self.network_drape(outfit, &between).map_err(PathError::Sample)?;
+                        Ok(made.sample(outfit))
                     }
                 }
             };
@@ -129,13 +187,14 @@ impl Draper {
         }
         let from_t_pose = |share: f64| {
             watch(share);
-            Ok::<_, DraperError>(match share {
-                1.0 => made.start.sample(outfit),
+            match share {
+                1.0 => Ok::<_, PathError>(made.start.sample(outfit)),
                 _ => {
                     let body = at(body.pose.scaled_keeping_heading(share), body.place);
-                    self.skinned_outfit(outfit, &body)?.sample(outfit)
+                    let start = self.skinned_outfit(outfit, &body).map_err(PathError::Sample)?;
+                    Ok(start.sample(outfit))
                 }
-            })
+            }
         };
         let anew = resolve_along(surface, &layers, settings, from_t_pose)?;
         // What carries on does not pop.
@@ -143,5 +202,44 @@ impl Draper {
             Some(carried) => carried.or(anew),
             None => anew,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn left(intersections: usize, strain: f64) -> Certificate {
+        Certificate {
+            body_triangle_pairs: intersections,
+            strain_added: Some(strain),
+            ..Certificate::default()
+        }
+    }
+
+    #[test]
+    fn after_a_frame_with_flaws_intersections_are_allowed_but_no_growing_strain() {
+        for (certificate, at_first, after_intersections, after_strain) in [
+            (left(0, 0.4), true, true, true),
+            (left(0, -0.4), true, true, true),
+            (left(3, 0.0), false, true, true),
+            (left(0, 0.6), false, true, true),
+            (left(0, 1.2), false, false, true),
+            (left(9, 3.0), false, false, false),
+        ] {
+            assert_eq!(RetryPolicy::NONE.is_met(&certificate), at_first, "{certificate:?}");
+            assert_eq!(
+                RetryPolicy::after(&left(7, 0.0)).is_met(&certificate),
+                after_intersections,
+                "{certificate:?}"
+            );
+            assert_eq!(
+                RetryPolicy::after(&left(0, 1.0)).is_met(&certificate),
+                after_strain,
+                "{certificate:?}"
+            );
+            assert!(RetryPolicy::ALL.is_met(&certificate));
+        }
+        assert!(RetryPolicy::after(&left(0, f64::INFINITY)).is_met(&left(1, f64::INFINITY)));
     }
 }

@@ -1,31 +1,27 @@
 //! A motion: each frame carries on from the one before, and what that leaves over from the one after.
 
-use super::frame::{Frame, PreviousFrame};
+use super::bodies::{Bodies, BodyState, Moment};
+use super::drape::Drape;
+use super::draper::Draper;
+use super::frame::{Frame, PreviousFrame, RetryPolicy};
+use super::outfit::Outfit;
+use super::smooth::{Smoothing, smooth};
 use super::temporal_filter::TemporalFilter;
-use super::{BodyState, Certificate, Drape, Draper, DraperError, Outfit};
+use clothcombo_physics::contact::resolve::Certificate;
+use miette::Report;
 
 /// So many frames after one that was left with flaws only carry on: poses change slowly, and starting anew takes seconds.
 const FRAMES_WITHOUT_RETRY: usize = 15;
 
-/// Flaws that carrying on from another frame may leave.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct RetryPolicy {
-    intersections: usize,
-    excess_strain: usize,
-}
+/// Frames this near to each other show the same cloth (s); a little more than 0.05, for rounding.
+const CLOSE_FRAMES: f64 = 0.050_001;
 
-impl RetryPolicy {
-    const NONE: Self = Self { intersections: 0, excess_strain: 0 };
-    const ALL: Self = Self { intersections: usize::MAX, excess_strain: usize::MAX };
-
-    /// After a frame of which starting anew left these: excess strain must not grow from frame to frame.
-    fn after(anew: &Certificate) -> Self {
-        Self { intersections: usize::MAX, excess_strain: anew.excess_strain().saturating_add(1) }
-    }
-
-    pub fn is_met(self, certificate: &Certificate) -> bool {
-        certificate.intersections() <= self.intersections && certificate.excess_strain() <= self.excess_strain
-    }
+/// Frames to each side over which a motion is smoothed: where nothing else is asked for, two of frames that are
+/// [close](CLOSE_FRAMES), so that only what trembles is averaged.
+fn smoothing_radius(asked: Option<u16>, moments: &[Moment]) -> usize {
+    let is_close = |pair: &[Moment]| pair[1].seconds - pair[0].seconds <= CLOSE_FRAMES;
+    let usual = if moments.windows(2).all(is_close) { 2 } else { 0 };
+    asked.map_or(usual, usize::from)
 }
 
 /// How far [`Draper::drape_motion`] is.
@@ -41,6 +37,25 @@ pub enum DrapeProgress {
 }
 
 impl Draper {
+    /// Drapes `outfit` on all of `bodies`, as [`drape_motion`](Self::drape_motion). A motion is smoothed over `radius` frames to
+    /// each side; `None`: over two where they are at most 0.05 s apart, else not.
+    ///
+    /// # Errors
+    /// When shape or pose do not fit the body model, or the networks diverge.
+    pub fn drape_bodies(
+        &self,
+        outfit: &Outfit,
+        bodies: &Bodies,
+        radius: Option<u16>,
+        progress: impl FnMut(DrapeProgress),
+    ) -> Result<(Vec<Drape>, Option<Smoothing>), Report> {
+        let radius = smoothing_radius(radius, &bodies.moments);
+        let mut drapes = self.drape_motion(outfit, &bodies.states, radius, progress)?;
+        let is_smoothed = radius > 0 && !bodies.moments.is_empty();
+        let smoothing = is_smoothed.then(|| smooth(self, outfit, &mut drapes, radius)).transpose()?;
+        Ok((drapes, smoothing))
+    }
+
     /// Drapes `outfit` on each of `bodies`, the frames of a motion. What the networks make is averaged over `radius`
     /// frames to each side before the post-process; 0 takes each frame as it is. The post-process carries on from frame
     /// to frame; where a frame is left with intersections or excess strain, and the one after it with less and no intersections,
@@ -55,7 +70,7 @@ impl Draper {
         bodies: &[BodyState],
         radius: usize,
         mut progress: impl FnMut(DrapeProgress),
-    ) -> Result<Vec<Drape>, DraperError> {
+    ) -> Result<Vec<Drape>, Report> {
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
         let (mut retry, mut frames_without_retry) = (RetryPolicy::NONE, 0);
         let refine = self.refine_steps(bodies.len());
@@ -101,7 +116,7 @@ impl Draper {
                 for (garment, other) in own.garments.iter_mut().zip(&again.garments) {
                     garment.resolve_ms += other.resolve_ms;
                 }
-                Ok::<_, DraperError>(())
+                Ok::<_, Report>(())
             },
         )?;
         Ok(drapes)
@@ -136,32 +151,6 @@ mod tests {
             strain_added: Some(strain),
             ..Certificate::default()
         }
-    }
-
-    #[test]
-    fn after_a_frame_with_flaws_intersections_are_allowed_but_no_growing_strain() {
-        for (certificate, at_first, after_intersections, after_strain) in [
-            (left(0, 0.4), true, true, true),
-            (left(0, -0.4), true, true, true),
-            (left(3, 0.0), false, true, true),
-            (left(0, 0.6), false, true, true),
-            (left(0, 1.2), false, false, true),
-            (left(9, 3.0), false, false, false),
-        ] {
-            assert_eq!(RetryPolicy::NONE.is_met(&certificate), at_first, "{certificate:?}");
-            assert_eq!(
-                RetryPolicy::after(&left(7, 0.0)).is_met(&certificate),
-                after_intersections,
-                "{certificate:?}"
-            );
-            assert_eq!(
-                RetryPolicy::after(&left(0, 1.0)).is_met(&certificate),
-                after_strain,
-                "{certificate:?}"
-            );
-            assert!(RetryPolicy::ALL.is_met(&certificate));
-        }
-        assert!(RetryPolicy::after(&left(0, f64::INFINITY)).is_met(&left(1, f64::INFINITY)));
     }
 
     #[test]
@@ -200,5 +189,17 @@ mod tests {
         let failed = carry_back(&mut frames, |frame| frame, |_, _, _| Err("an error comes back"));
         assert_eq!(failed, Err("an error comes back"));
         assert!(carry_back(&mut [], |frame: &Certificate| frame, |_, _, _| Err("none")).is_ok());
+    }
+
+    #[test]
+    fn frames_far_from_each_other_are_only_smoothed_if_asked_for() {
+        let moments = |rate: f64| -> Vec<Moment> {
+            (0..5).map(|frame| Moment { frame, seconds: frame as f64 / rate }).collect()
+        };
+        assert_eq!(
+            [60.0, 30.0, 20.0, 19.0, 3.0].map(|rate| smoothing_radius(None, &moments(rate))),
+            [2, 2, 2, 0, 0]
+        );
+        assert_eq!([0, 3].map(|asked| smoothing_radius(Some(asked), &moments(3.0))), [0, 3]);
     }
 }

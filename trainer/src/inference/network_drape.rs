@@ -1,17 +1,21 @@
 //! An outfit on one body, skinned and draped by the networks, brought to where the body stands.
 
-use super::{BodyState, Draper, DraperError, Outfit, PhaseTimes, elapsed};
-use crate::dataset::{BodySample, PreparedScene, SceneBuilder, SceneSample};
-use crate::inference::layer_interaction::LayerInteraction;
-use crate::inference::networks::drape_on;
-use crate::inference::on_body::OnBody;
-use crate::inference::tensor_store::body_tensors;
-use clothcombo_data::asset::PosedBody;
+use super::bodies::{BodyState, check_body_mesh};
+use super::drape::round;
+use super::draper::Draper;
+use super::networks::drape_on;
+use super::on_body::OnBody;
+use super::outfit::Outfit;
+use super::phase_times::{PhaseTimes, elapsed};
+use super::tensor_store::body_tensors;
+use crate::dataset::{BodySample, PreparedScene, SceneSample};
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
+use clothcombo_model::Mode;
 use clothcombo_physics::contact::resolve::PathSample;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::transform::Transform;
 use clothcombo_physics::vec3::add;
+use miette::{IntoDiagnostic, Report};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -56,9 +60,6 @@ pub(super) struct NetworkDrape {
     pub milliseconds: PhaseTimes,
 }
 
-/// Shape parameters are standard deviations: with a larger one there is no body any more.
-const MOST_SHAPE: f64 = 20.0;
-
 impl NetworkDrape {
     /// A sample of the continuation path from one frame of a motion to the next.
     pub fn sample(&self, outfit: &Outfit) -> PathSample {
@@ -68,17 +69,16 @@ impl NetworkDrape {
 
 impl Draper {
     /// Poses the body and skins `outfit` on it.
-    pub(super) fn skinned_outfit(
-        &self,
-        outfit: &Outfit,
-        body: &BodyState,
-    ) -> Result<SkinnedOutfit, DraperError> {
+    pub(super) fn skinned_outfit(&self, outfit: &Outfit, body: &BodyState) -> Result<SkinnedOutfit, Report> {
         let (shape, posed) = self.posed(body)?;
         let mut surface = match &body.surface {
-            Some(given) => self.checked_surface(given)?.to_vec(),
+            Some(given) => {
+                check_body_mesh(self.body(), "the posed body", given)?;
+                given.clone()
+            }
             None => posed.positions.iter().map(|p| add(*p, body.place)).collect(),
         };
-        super::drape::round(&mut surface);
+        round(&mut surface);
         let surface = Arc::new(Surface::new(surface, self.body().faces.clone()));
         let (facing, heading) = body.pose.without_heading();
         let (facing, yaw) = match self.trained.config.data.poses.remove_heading {
@@ -95,22 +95,18 @@ impl Draper {
     }
 
     /// Poses the body and lets the networks drape `outfit` on it.
-    pub(super) fn network_drape(
-        &self,
-        outfit: &Outfit,
-        body: &BodyState,
-    ) -> Result<NetworkDrape, DraperError> {
+    pub(super) fn network_drape(&self, outfit: &Outfit, body: &BodyState) -> Result<NetworkDrape, Report> {
         let clock = Instant::now();
         let start = self.skinned_outfit(outfit, body)?;
         let scene = &start.scene;
         let (tensors, start_tensor) =
-            body_tensors(&scene.bodies[0], &self.dimensions(), &self.settings.device)?;
+            body_tensors(&scene.bodies[0], &self.dimensions(), &self.settings.device).into_diagnostic()?;
         let posing = elapsed(clock);
 
         let (outfit_tensors, embeddings) = (&outfit.tensors, &outfit.embeddings);
         let on_body =
             OnBody { scene, outfit: outfit_tensors, embeddings, body: &tensors, start: start_tensor };
-        let (draped, times) = drape_on(&self.model, &on_body, LayerInteraction::Together);
+        let (draped, times) = drape_on(&self.model, &on_body, Mode::Layered);
 
         let turned = |p: &[f32; 3]| add(apply(&start.turn, p.map(f64::from)), body.place);
         let network: Vec<[f64; 3]> = draped.posed.iter().map(turned).collect();
@@ -125,19 +121,6 @@ impl Draper {
         Ok(NetworkDrape { start, network, milliseconds })
     }
 
-    /// What prepares scenes as the model was trained on them.
-    pub(super) fn scene_builder(&self) -> SceneBuilder<'_> {
-        let config = &self.trained.config;
-        SceneBuilder {
-            body: self.body(),
-            joints: &self.joints,
-            encoding: config.data.poses.encoding,
-            losses: &config.losses,
-            graph: config.model.graph,
-            layer_thickness: config.layer_thickness(),
-        }
-    }
-
     fn scene(&self, outfit: &Outfit, body: BodySample) -> PreparedScene {
         let shape = body.shape.clone();
         let sample = SceneSample {
@@ -150,52 +133,6 @@ impl Draper {
         let seen = self.shape_space.seen(self.body(), &shape, self.trained.state.shape_count);
         scene.bodies[0].shape = seen.into_iter().map(|b| b as f32).collect();
         scene
-    }
-
-    /// The shape with all its parameters, and the body model's own surface.
-    fn posed(&self, body: &BodyState) -> Result<(Vec<f64>, PosedBody), DraperError> {
-        let shape = self.checked_shape(&body.shape)?;
-        if body.pose.rotations.as_flattened().iter().chain(&body.place).any(|x| !x.is_finite()) {
-            return Err(DraperError::NotFinite { what: "pose" });
-        }
-        let posed = self.body().posed(&shape, &body.pose)?;
-        Ok((shape, posed))
-    }
-
-    /// Whether `body` can be dressed: what [`drape`](Self::drape) would say, at once.
-    ///
-    /// # Errors
-    /// When shape, pose or surface do not fit the body model.
-    pub fn check_body(&self, body: &BodyState) -> Result<(), DraperError> {
-        self.posed(body)?;
-        body.surface.as_deref().map_or(Ok(()), |given| self.checked_surface(given).map(|_| ()))
-    }
-
-    fn checked_shape(&self, shape: &[f64]) -> Result<Vec<f64>, DraperError> {
-        if shape.iter().any(|x| !x.is_finite()) {
-            return Err(DraperError::NotFinite { what: "shape" });
-        }
-        if let Some(value) = shape.iter().find(|x| x.abs() > MOST_SHAPE) {
-            return Err(DraperError::Shape { value: *value, most: MOST_SHAPE });
-        }
-        let mut shape = shape.to_vec();
-        let count = self.body().shape_count;
-        // Longer ones are refused by the body, by name.
-        if shape.len() < count {
-            shape.resize(count, 0.0);
-        }
-        Ok(shape)
-    }
-
-    fn checked_surface<'a>(&self, surface: &'a [[f64; 3]]) -> Result<&'a [[f64; 3]], DraperError> {
-        let (found, expected) = (surface.len(), self.body().vertex_count());
-        if found != expected {
-            return Err(DraperError::Surface { body: self.body().name.clone(), found, expected });
-        }
-        match surface.as_flattened().iter().all(|x| x.is_finite()) {
-            true => Ok(surface),
-            false => Err(DraperError::NotFinite { what: "posed body" }),
-        }
     }
 }
 

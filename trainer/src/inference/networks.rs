@@ -2,26 +2,23 @@
 
 use super::acceptance::{accepted, skinned};
 use super::draped::Draped;
-use super::layer_interaction::LayerInteraction;
 use super::on_body::OnBody;
 use super::tensor_store::{DrapeError, KnownEmbeddings, TensorStore};
 use crate::dataset::PreparedScene;
-use burn::tensor::Tensor;
 use clothcombo_model::{ClothCombo, DrapeStates, Mode};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The networks ready for inference; garments are embedded once.
 pub struct Networks<'a> {
     model: ClothCombo,
     tensors: &'a TensorStore,
-    embeddings: Arc<KnownEmbeddings>,
+    embeddings: KnownEmbeddings,
 }
 
 impl<'a> Networks<'a> {
     /// Wraps a model without automatic differentiation.
     pub fn new(model: ClothCombo, tensors: &'a TensorStore) -> Self {
-        Self { model, tensors, embeddings: Arc::new(tensors.kept_embeddings()) }
+        Self { model, tensors, embeddings: tensors.kept_embeddings() }
     }
 
     /// Drapes the garments of `scene` together on its first body.
@@ -29,23 +26,15 @@ impl<'a> Networks<'a> {
     /// # Errors
     /// When the scene's numbers are not finite.
     pub fn drape(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
-        self.on_first_body(scene, Mode::Layered, |on_body| {
-            drape_on(&self.model, on_body, LayerInteraction::Together).0
-        })
+        self.on_first_body(scene, Mode::Layered, |on_body| drape_on(&self.model, on_body, Mode::Layered).0)
     }
 
     /// What the forward pass alone makes of `scene`, taken as it is.
     ///
     /// # Errors
     /// When the scene's numbers are not finite.
-    pub fn forward(
-        &self,
-        scene: &PreparedScene,
-        interaction: LayerInteraction,
-    ) -> Result<Draped, DrapeError> {
-        self.on_first_body(scene, interaction.mode(), |on_body| {
-            forward_on(&self.model, on_body, interaction).1
-        })
+    pub fn forward(&self, scene: &PreparedScene, mode: Mode) -> Result<Draped, DrapeError> {
+        self.on_first_body(scene, mode, |on_body| forward_on(&self.model, on_body, mode).1)
     }
 
     /// Drapes every garment of `scene` as a single garment.
@@ -53,8 +42,7 @@ impl<'a> Networks<'a> {
     /// # Errors
     /// When the scene's numbers are not finite.
     pub fn drape_single_garments(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
-        let interaction = LayerInteraction::SingleGarments;
-        self.on_first_body(scene, Mode::Single, |on_body| drape_on(&self.model, on_body, interaction).0)
+        self.on_first_body(scene, Mode::Single, |on_body| drape_on(&self.model, on_body, Mode::Single).0)
     }
 
     fn on_first_body<T>(
@@ -78,8 +66,9 @@ impl<'a> Networks<'a> {
     /// # Errors
     /// When the scene's numbers are not finite.
     pub fn skin(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
-        let (_, start) = self.tensors.body(&scene.bodies[0])?;
-        self.skin_from(scene, start)
+        let weights = self.tensors.outfit(scene)?.skin_weights;
+        let (body, start) = self.tensors.body(&scene.bodies[0])?;
+        Ok(skinned(start, weights, &body))
     }
 
     /// Linear blend skinning of the rest garments, whatever the body's shape: the paper's baseline.
@@ -87,14 +76,9 @@ impl<'a> Networks<'a> {
     /// # Errors
     /// When the scene's numbers are not finite.
     pub fn skin_rest(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
-        let rest = self.tensors.outfit(scene)?.rest;
-        self.skin_from(scene, rest)
-    }
-
-    fn skin_from(&self, scene: &PreparedScene, start: Tensor<2>) -> Result<Draped, DrapeError> {
         let outfit = self.tensors.outfit(scene)?;
         let (body, _) = self.tensors.body(&scene.bodies[0])?;
-        Ok(skinned(start, outfit.skin_weights, &body))
+        Ok(skinned(outfit.rest, outfit.skin_weights, &body))
     }
 }
 
@@ -108,27 +92,19 @@ pub struct NetworkTimes {
 }
 
 /// The forward pass of `model` on an outfit, all its garments together or each as a single garment, and its last state.
-pub fn forward_on(
-    model: &ClothCombo,
-    on_body: &OnBody<'_>,
-    interaction: LayerInteraction,
-) -> (DrapeStates, Draped) {
+pub fn forward_on(model: &ClothCombo, on_body: &OnBody<'_>, mode: Mode) -> (DrapeStates, Draped) {
     let OnBody { outfit, embeddings, body, start, .. } = on_body;
-    let states = model.forward(outfit, embeddings, body, start.clone(), interaction.mode());
+    let states = model.forward(outfit, embeddings, body, start.clone(), mode);
     let last = Draped::of(states.last());
     (states, last)
 }
 
 /// Lets `model` drape an outfit; the result is judged beside skinning.
-pub fn drape_on(
-    model: &ClothCombo,
-    on_body: &OnBody<'_>,
-    interaction: LayerInteraction,
-) -> (Draped, NetworkTimes) {
+pub fn drape_on(model: &ClothCombo, on_body: &OnBody<'_>, mode: Mode) -> (Draped, NetworkTimes) {
     let clock = Instant::now();
     // On the host before the clock is read: devices compute behind the caller's back.
-    let (states, proposed) = forward_on(model, on_body, interaction);
+    let (states, proposed) = forward_on(model, on_body, mode);
     let forward = clock.elapsed();
-    let found = accepted(on_body, &proposed, &states.skin_weights, interaction);
+    let found = accepted(on_body, &proposed, &states.skin_weights, mode);
     (found, NetworkTimes { forward, acceptance: clock.elapsed() - forward })
 }

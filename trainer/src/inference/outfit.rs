@@ -1,20 +1,15 @@
 //! Garments that are draped together, with everything that does not depend on the body.
 
-use super::Draper;
-use super::embedded::{EmbeddedGarment, GarmentTimes};
-use super::error::DraperError;
+use super::checks::check_sizes;
+use super::draper::Draper;
 use super::names::UniqueNames;
+use super::phase_times::PhaseTimes;
 use super::source::GivenGarment;
 use crate::dataset::{Arrangement, PreparedGarment};
 use clothcombo_model::{Embeddings, Mode, OutfitTensors};
 use clothcombo_physics::contact::resolve::{Layer, ResolveError, RestGarment};
+use miette::{IntoDiagnostic, Report, miette};
 use std::sync::Arc;
-
-/// Most garments of an outfit.
-pub const MAX_GARMENTS: usize = 12;
-
-/// Most vertices of a garment: at the paper's sizes the operators of one take 2 kB a vertex, its embedding as much.
-pub const MAX_VERTICES: usize = 100_000;
 
 /// A garment of an outfit.
 #[derive(Clone)]
@@ -29,8 +24,8 @@ pub struct OutfitGarment {
     pub rest: Arc<RestGarment>,
     /// Whether the embedding was there already, in memory or in the cache.
     pub embedding_known: bool,
-    /// What it cost this time.
-    pub milliseconds: GarmentTimes,
+    /// What preparing and embedding it cost this time.
+    pub milliseconds: PhaseTimes,
 }
 
 /// Garments that are draped together, innermost first, with everything that does not depend on the body.
@@ -42,48 +37,39 @@ pub struct Outfit {
     pub(super) embeddings: Embeddings,
 }
 
-impl Outfit {
-    /// Packs embedded garments, innermost first.
-    pub(super) fn new(
-        draper: &Draper,
-        sources: Vec<GivenGarment>,
-        embedded: Vec<EmbeddedGarment>,
-    ) -> Result<Self, DraperError> {
-        let prepared = embedded.iter().map(|e| e.prepared.clone()).collect();
-        let arrangement = draper.scene_builder().arrange(prepared, &[]);
-        let tensors = embedded.iter().map(|e| &e.tensors).collect::<Vec<_>>();
-        let tensors = OutfitTensors::new(&tensors, &arrangement.contacts)?
-            .with_thickness_below(&arrangement.thickness_below)?;
-        let embeddings = embedded.iter().map(|e| e.embedding.clone()).collect::<Vec<_>>();
-        let embeddings = draper.model.pack(&tensors, &embeddings, Mode::Layered)?;
-        let mut names = UniqueNames::default();
-        let garment = |(source, embedded): (GivenGarment, EmbeddedGarment)| OutfitGarment {
-            name: names.take(&source.garment.name),
-            source: Arc::new(source),
-            prepared: embedded.prepared,
-            rest: embedded.rest,
-            embedding_known: embedded.was_known,
-            milliseconds: embedded.milliseconds,
-        };
-        let garments = sources.into_iter().zip(embedded).map(garment).collect();
-        Ok(Self { garments, arrangement, tensors, embeddings })
-    }
-
-    /// Whether `garments` are few and small enough to be an outfit: what [`Draper::outfit`] would say, at once.
+impl Draper {
+    /// Prepares and embeds garments, innermost first. A garment this draper has met before, by content, costs nothing.
     ///
     /// # Errors
-    /// When they are not.
-    pub fn check(garments: &[GivenGarment]) -> Result<(), DraperError> {
-        if garments.is_empty() || garments.len() > MAX_GARMENTS {
-            return Err(DraperError::Count { count: garments.len(), most: MAX_GARMENTS });
+    /// For more garments than an outfit may have, or one that cannot be prepared.
+    pub fn outfit(&self, garments: Vec<GivenGarment>) -> Result<Outfit, Report> {
+        check_sizes(&garments)?;
+        let (mut made, mut prepared, mut tensors, mut embeddings) = (vec![], vec![], vec![], vec![]);
+        let mut names = UniqueNames::default();
+        for source in garments {
+            let embedded = self.embed(&source)?;
+            prepared.push(embedded.prepared.clone());
+            tensors.push(embedded.tensors);
+            embeddings.push(embedded.embedding);
+            made.push(OutfitGarment {
+                name: names.take(&source.garment.name),
+                source: Arc::new(source),
+                prepared: embedded.prepared,
+                rest: embedded.rest,
+                embedding_known: embedded.was_known,
+                milliseconds: embedded.milliseconds,
+            });
         }
-        let sizes = garments.iter().map(|source| (&source.garment.name, source.garment.rest.vertex_count()));
-        match sizes.into_iter().find(|(_, vertices)| *vertices > MAX_VERTICES) {
-            Some((name, vertices)) => Err(DraperError::TooLarge { name: name.clone(), vertices }),
-            None => Ok(()),
-        }
+        let arrangement = self.scene_builder().arrange(prepared, &[]);
+        let tensors = OutfitTensors::new(&tensors.iter().collect::<Vec<_>>(), &arrangement.contacts)
+            .and_then(|tensors| tensors.with_thickness_below(&arrangement.thickness_below))
+            .into_diagnostic()?;
+        let embeddings = self.model.pack(&tensors, &embeddings, Mode::Layered).into_diagnostic()?;
+        Ok(Outfit { garments: made, arrangement, tensors, embeddings })
     }
+}
 
+impl Outfit {
     /// Names, innermost first.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.garments.iter().map(|p| p.name.as_str())
@@ -105,24 +91,35 @@ impl Outfit {
         pieces.map(|(piece, positions)| Layer { garment: &piece.rest, positions }).collect()
     }
 
-    /// `error` with the garment's name where the post-process knows only its number.
-    pub(super) fn named(&self, error: DraperError) -> DraperError {
-        let name = |garment: usize| self.garments.get(garment).map_or_else(String::new, |g| g.name.clone());
+    /// An error of the post-process, with the garment's name where that knows only its number.
+    pub(super) fn named(&self, error: ResolveError) -> Report {
+        let name = |garment: usize| self.garments.get(garment).map_or("", |g| g.name.as_str());
         match error {
-            DraperError::Resolve(ResolveError::Position { garment, vertex, position }) => {
-                DraperError::Far { garment: name(garment), vertex, position }
-            }
-            DraperError::Resolve(ResolveError::DoubledFace { garment, face, first }) => {
-                DraperError::DoubledFace { garment: name(garment), face, first }
-            }
-            other => other,
+            ResolveError::Position { garment, vertex, position: [x, y, z] } => miette!(
+                help = "positions are finite, in metres, within a kilometre of the origin: check the garment's coordinates, \
+                        `clothcombo fit` finds unit and axes",
+                "post-process: garment '{}', vertex {vertex} (from 0) is at [{x}, {y}, {z}]",
+                name(garment)
+            ),
+            ResolveError::DoubledFace { garment, face, first } => miette!(
+                help =
+                    "let the mesh be repaired: `clothcombo fit` does it, and drape where --fit is not never",
+                "post-process: garment '{}', face {face} (from 0) has the vertices of face {first}",
+                name(garment)
+            ),
+            other => miette!("post-process: {other}"),
         }
     }
 
-    pub(super) fn check_finite(&self, packed: &[[f64; 3]]) -> Result<(), DraperError> {
+    pub(super) fn check_finite(&self, packed: &[[f64; 3]]) -> Result<(), Report> {
         for (piece, part) in self.garments.iter().zip(self.split(packed)) {
             if part.as_flattened().iter().any(|x| !x.is_finite()) {
-                return Err(DraperError::Diverged { garment: piece.name.clone() });
+                return Err(miette!(
+                    help = "either the garment lies far from the body (metres, y up, about the origin: `clothcombo fit` finds \
+                            unit and axes), or the model is damaged or was trained to divergence: try an earlier checkpoint",
+                    "the networks moved garment '{}' to a place that is not finite",
+                    piece.name
+                ));
             }
         }
         Ok(())

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
+use std::time::Instant;
 
 /// Wall time by phase (ms); all garments together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -26,16 +27,7 @@ pub struct PhaseTimes {
 
 impl AddAssign for PhaseTimes {
     fn add_assign(&mut self, other: Self) {
-        for (own, more) in [
-            (&mut self.preparation, other.preparation),
-            (&mut self.embedding, other.embedding),
-            (&mut self.posing, other.posing),
-            (&mut self.networks, other.networks),
-            (&mut self.acceptance, other.acceptance),
-            (&mut self.refine, other.refine),
-            (&mut self.resolve, other.resolve),
-            (&mut self.certificate, other.certificate),
-        ] {
+        for (own, (_, more)) in self.each_mut().into_iter().zip(other.phases()) {
             *own += more;
         }
     }
@@ -56,8 +48,25 @@ impl PhaseTimes {
         ]
     }
 
+    fn each_mut(&mut self) -> [&mut f64; 8] {
+        let Self { preparation, embedding, posing, networks, acceptance, refine, resolve, certificate } =
+            self;
+        [preparation, embedding, posing, networks, acceptance, refine, resolve, certificate]
+    }
+
+    /// So much of every phase.
+    pub(super) fn scaled(mut self, share: f64) -> Self {
+        self.each_mut().into_iter().for_each(|ms| *ms *= share);
+        self
+    }
+
     /// Sum of all phases.
     pub fn total(&self) -> f64 {
         self.phases().iter().map(|(_, ms)| ms).sum()
     }
+}
+
+/// Time since `clock` (ms).
+pub(super) fn elapsed(clock: Instant) -> f64 {
+    1e3 * clock.elapsed().as_secs_f64()
 }

@@ -1,8 +1,7 @@
 //! Steps of the static solver that make no intersection and lower the energy that networks and post-process leave.
 
-use super::error::DraperError;
 use clothcombo_physics::energy::SceneEnergy;
-use clothcombo_physics::equilibrium::{Problem, SolverSettings, Stop, solve};
+use clothcombo_physics::equilibrium::{EquilibriumError, Problem, SolverSettings, Stop, solve};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::str::FromStr;
@@ -11,13 +10,13 @@ use std::time::Duration;
 /// No vertex moves farther than this in one step (m): about as far as the faces of the body near it stay the same.
 const STEP_BOUND: f64 = 0.02;
 /// With [`RefineSteps::Auto`], refinement ends with a step that lowers the energy by less than this share of all steps together…
-const LEAST_SHARE: f64 = 0.01;
+const LEAST_REFINE_GAIN: f64 = 0.01;
 /// …or after this time.
 const MOST_TIME: Duration = Duration::from_secs(2);
 /// Refinement ends where a vertex has come farther than this from where it began (m).
-const REACH: f64 = 0.05;
+const FARTHEST_MOVE: f64 = 0.05;
 /// What a step leaves between the elements of triangles (m): a twentieth of the post-process's gap.
-const MARGIN: f64 = 5e-5;
+const LEFT_BETWEEN: f64 = 5e-5;
 
 /// How many steps a refinement takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,7 +27,21 @@ pub enum RefineSteps {
     Auto,
 }
 
+/// Most steps that are taken: far more than gain anything.
+const MOST_REFINE_STEPS: usize = 1000;
+
 impl RefineSteps {
+    /// At most so many, if that is a number of steps that is worth asking for.
+    ///
+    /// # Errors
+    /// For more than 1000, in words.
+    pub fn at_most(steps: usize) -> Result<Self, String> {
+        match steps <= MOST_REFINE_STEPS {
+            true => Ok(Self::AtMost(steps)),
+            false => Err(format!("it must be at most {MOST_REFINE_STEPS} steps, or auto")),
+        }
+    }
+
     /// For so many frames: four steps for one, which gain most of what eight do; none for a motion, whose time they treble.
     pub fn default_of(frames: usize) -> Self {
         Self::AtMost(if frames == 1 { 4 } else { 0 })
@@ -41,9 +54,7 @@ impl FromStr for RefineSteps {
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
             "auto" => Ok(Self::Auto),
-            number => {
-                number.parse().map(Self::AtMost).map_err(|_| "expected a number of steps, or auto".into())
-            }
+            number => Self::at_most(number.parse().map_err(|_| "expected a number of steps, or auto")?),
         }
     }
 }
@@ -71,7 +82,7 @@ pub fn refine(
     energy: &SceneEnergy<f64>,
     start: &[[f64; 3]],
     steps: RefineSteps,
-) -> Result<(Vec<[f64; 3]>, Refinement), DraperError> {
+) -> Result<(Vec<[f64; 3]>, Refinement), EquilibriumError> {
     let settings = SolverSettings {
         iterations: match steps {
             RefineSteps::AtMost(steps) => steps,
@@ -79,8 +90,8 @@ pub fn refine(
         },
         step_bound: STEP_BOUND,
         time: (steps == RefineSteps::Auto).then_some(MOST_TIME),
-        escape_distance: Some(REACH),
-        margin: Some(MARGIN),
+        escape_distance: Some(FARTHEST_MOVE),
+        margin: Some(LEFT_BETWEEN),
         ..SolverSettings::default()
     };
     let problem = Problem::new(energy)?;
@@ -108,10 +119,10 @@ pub fn refine(
     Ok((solution.positions, done))
 }
 
-/// Whether the last of the steps between `energies` lowered them by less than [`LEAST_SHARE`] of what all did.
+/// Whether the last of the steps between `energies` lowered them by less than [`LEAST_REFINE_GAIN`] of what all did.
 fn is_enough(energies: &[f64]) -> bool {
     match energies {
-        [first, .., before, last] => before - last < LEAST_SHARE * (first - last),
+        [first, .., before, last] => before - last < LEAST_REFINE_GAIN * (first - last),
         _ => false,
     }
 }
@@ -124,7 +135,10 @@ mod tests {
     fn steps_are_a_number_or_auto_and_the_last_small_one_is_enough() {
         assert_eq!("4".parse(), Ok(RefineSteps::AtMost(4)));
         assert_eq!("auto".parse(), Ok(RefineSteps::Auto));
-        assert!("-1".parse::<RefineSteps>().is_err());
+        assert!("1000".parse::<RefineSteps>().is_ok());
+        for refused in ["-1", "1001", "99999999999999999999999"] {
+            assert!(refused.parse::<RefineSteps>().is_err(), "{refused}");
+        }
         assert!(!is_enough(&[1.0]) && !is_enough(&[1.0, 0.5]) && !is_enough(&[1.0, 0.5, 0.4]));
         assert!(is_enough(&[1.0, 0.5, 0.499]));
     }

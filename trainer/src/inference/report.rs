@@ -1,9 +1,13 @@
 //! What a drape reports: `report.json`.
 
 use super::acceleration::{Acceleration, acceleration};
+use super::bodies::{Bodies, BodyReport};
+use super::drape::{Drape, GarmentDrape};
+use super::draper::Draper;
+use super::outfit::{Outfit, OutfitGarment};
+use super::phase_times::PhaseTimes;
 use super::refine::Refinement;
-use super::{Bodies, BodyReport, Drape, Draper, DraperError, Outfit, PhaseTimes, Smoothing};
-use crate::dataset::DatasetError;
+use super::smooth::Smoothing;
 use crate::score::{DrapedGarment, Score, ScoreDistance, score};
 use crate::system::device::name;
 use crate::system::paths::{lossy, lossy_option};
@@ -11,6 +15,7 @@ use clothcombo_data::asset::{Category, GarmentMaterial};
 use clothcombo_data::fit::FitReport;
 use clothcombo_physics::contact::resolve::Certificate;
 use clothcombo_physics::mesh::TriMesh;
+use miette::{IntoDiagnostic, Report};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -72,7 +77,7 @@ pub struct FrameReport {
 
 /// Everything about a drape.
 #[derive(Clone, Debug, Serialize)]
-pub struct Report {
+pub struct DrapeReport {
     /// The program.
     pub program: String,
     /// Name of the device that the networks ran on.
@@ -111,7 +116,7 @@ pub struct Report {
     pub frames: Vec<FrameReport>,
 }
 
-impl Report {
+impl DrapeReport {
     /// Puts the report of `drapes`, which are on `bodies`, together.
     ///
     /// # Errors
@@ -122,19 +127,17 @@ impl Report {
         drapes: &[Drape],
         bodies: &Bodies,
         smoothing: Option<Smoothing>,
-    ) -> Result<Self, DraperError> {
+    ) -> Result<Self, Report> {
         let (first, moments) = (&drapes[0], &bodies.moments);
         let mut milliseconds = PhaseTimes::default();
         drapes.iter().for_each(|drape| milliseconds += drape.milliseconds);
-        for garment in &outfit.garments {
-            milliseconds.preparation += garment.milliseconds.preparation;
-            milliseconds.embedding += garment.milliseconds.embedding;
-        }
+        outfit.garments.iter().for_each(|garment| milliseconds += garment.milliseconds);
         let (certificate_before, (before, after)) = rayon::join(
             || first.certificate_before(draper, outfit),
             || {
-                let score = |which| first.score(draper, outfit, which);
-                rayon::join(|| score(ScoredPositions::Network), || score(ScoredPositions::Result))
+                let score =
+                    |positions: fn(&GarmentDrape) -> &Vec<[f64; 3]>| first.score(draper, outfit, positions);
+                rayon::join(|| score(|g| &g.network), || score(|g| &g.positions))
             },
         );
         let frames = drapes.iter().zip(moments).map(|(drape, moment)| FrameReport {
@@ -169,17 +172,8 @@ impl Report {
     }
 }
 
-/// Which positions of a drape are scored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ScoredPositions {
-    /// Of the networks.
-    Network,
-    /// The result.
-    Result,
-}
-
 impl Drape {
-    /// Scores this drape by the paper's energies (see [`crate::score`]).
+    /// Scores these `positions` of the garments by the paper's energies (see [`crate::score`]).
     ///
     /// # Errors
     /// When a value overflows.
@@ -187,10 +181,9 @@ impl Drape {
         &self,
         draper: &Draper,
         outfit: &Outfit,
-        which: ScoredPositions,
-    ) -> Result<Score, DraperError> {
-        let refused = |e: &dyn std::fmt::Display| DatasetError::Data(e.to_string());
-        let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).map_err(|e| refused(&e))?;
+        positions: fn(&GarmentDrape) -> &Vec<[f64; 3]>,
+    ) -> Result<Score, Report> {
+        let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).into_diagnostic()?;
         let garments: Vec<DrapedGarment> = outfit
             .garments
             .iter()
@@ -198,39 +191,25 @@ impl Drape {
             .map(|(garment, drape)| DrapedGarment {
                 name: &garment.name,
                 rest: &garment.prepared.garment.rest,
-                positions: match which {
-                    ScoredPositions::Network => &drape.network,
-                    ScoredPositions::Result => &drape.positions,
-                },
+                positions: positions(drape),
                 canonical: None,
             })
             .collect();
-        Ok(score(&body, &garments, ScoreDistance::default()).map_err(|e| refused(&e))?)
+        score(&body, &garments, ScoreDistance::default())
     }
 }
 
 fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<DrapedGarmentReport> {
     let all: usize = outfit.garments.iter().map(|p| p.prepared.vertex_count()).sum();
-    let report = |(index, garment): (usize, &super::OutfitGarment)| {
+    let report = |(index, garment): (usize, &OutfitGarment)| {
         let vertices = garment.prepared.vertex_count();
         let share = vertices as f64 / all.max(1) as f64;
-        let mut times = PhaseTimes {
-            preparation: garment.milliseconds.preparation,
-            embedding: garment.milliseconds.embedding,
-            ..PhaseTimes::default()
-        };
+        let mut times = garment.milliseconds;
         for drape in drapes {
-            let shared = drape.milliseconds;
             let own: f64 = drape.garments.iter().map(|g| g.resolve_ms).sum();
-            times += PhaseTimes {
-                posing: share * shared.posing,
-                networks: share * shared.networks,
-                acceptance: share * shared.acceptance,
-                refine: share * shared.refine,
-                resolve: drape.garments[index].resolve_ms + share * (shared.resolve - own),
-                certificate: share * shared.certificate,
-                ..PhaseTimes::default()
-            };
+            let shared = PhaseTimes { resolve: drape.milliseconds.resolve - own, ..drape.milliseconds };
+            times += shared.scaled(share);
+            times.resolve += drape.garments[index].resolve_ms;
         }
         DrapedGarmentReport {
             name: garment.name.clone(),

@@ -16,7 +16,7 @@ pub(super) enum ShapeSpace {
 }
 
 /// Bodies are the same where they differ by no more than rounding (m).
-const SAME: f64 = 1e-5;
+const SAME_POSITION: f64 = 1e-5;
 
 impl ShapeSpace {
     /// That of `body`, for networks trained on `model_body`.
@@ -69,7 +69,7 @@ fn matched(own: &Body, range: [f64; 2], body: &Body, shape: &[f64]) -> Vec<f64> 
 
 /// Whether equal parameters make equal bodies, in the components that both have.
 fn is_same_space(a: &Body, b: &Body) -> bool {
-    let near = |x: f64, y: f64| (x - y).abs() < SAME;
+    let near = |x: f64, y: f64| (x - y).abs() < SAME_POSITION;
     let k = a.shape_count.min(b.shape_count);
     // A body without shapes is the mean body.
     if a.vertex_count() != b.vertex_count() {

@@ -1,13 +1,13 @@
 //! The model that is used when none is named: it is part of the program.
 
-use super::error::DraperError;
 #[cfg(feature = "built-in-model")]
 use crate::run::checkpoint::ModelFiles;
 use crate::run::checkpoint::TrainedModel;
+use miette::Report;
 
 /// `models/default` of the checkout that the program was built from.
 #[cfg(feature = "built-in-model")]
-static FILES: ModelFiles = ModelFiles {
+static SHIPPED_FILES: ModelFiles = ModelFiles {
     state: include_str!("../../../models/default/state.json"),
     config: include_str!("../../../models/default/config.toml"),
     parameters: include_bytes!("../../../models/default/model.safetensors"),
@@ -18,11 +18,14 @@ static FILES: ModelFiles = ModelFiles {
 ///
 /// # Errors
 /// When the program was built without it (feature `built-in-model`).
-pub fn shipped_model() -> Result<TrainedModel, DraperError> {
+pub fn shipped_model() -> Result<TrainedModel, Report> {
     #[cfg(feature = "built-in-model")]
-    return Ok(TrainedModel::built_in(&FILES)?);
+    return Ok(TrainedModel::built_in(&SHIPPED_FILES)?);
     #[cfg(not(feature = "built-in-model"))]
-    Err(DraperError::NoModel)
+    Err(miette::miette!(
+        help = "name one with --checkpoint: a run of clothcombo-train, or models/default of the project's checkout",
+        "no trained model: none was named, and this program was built without one"
+    ))
 }
 
 #[cfg(all(test, feature = "built-in-model"))]

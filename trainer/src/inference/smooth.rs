@@ -4,14 +4,17 @@
 //! cloth that merely follows the body stays as it is. Every smoothed frame is counted exactly; where it intersects more than the
 //! frame as it was, or has more excess strain, less of the smoothing is applied, and none if need be.
 
-use super::{Drape, Draper, DraperError, Outfit};
-use clothcombo_physics::transform::{into_frame, out_of_frame};
+use super::drape::Drape;
+use super::draper::Draper;
+use super::outfit::Outfit;
+use clothcombo_physics::transform::{Transform, into_frame, out_of_frame};
 use clothcombo_physics::vec3::{add, scale, sub};
+use miette::Report;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Shares of the smoothing that are tried, in this order.
-const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
+const SMOOTHING_SHARES: [f64; 3] = [1.0, 0.5, 0.25];
 
 /// Most frames to each side: at 60 frames a second all that moves in three seconds would be averaged.
 pub const MOST_RADIUS: u16 = 100;
@@ -38,13 +41,17 @@ pub fn smooth(
     outfit: &Outfit,
     drapes: &mut [Drape],
     radius: usize,
-) -> Result<Smoothing, DraperError> {
+) -> Result<Smoothing, Report> {
     let mut done = Smoothing { radius, whole: 0, partly: 0, left: 0 };
     if radius == 0 || drapes.len() < 2 {
         done.left = drapes.len();
         return Ok(done);
     }
-    let offsets: Vec<Vec<Vec<[f64; 3]>>> = drapes.par_iter().map(local_offsets).collect();
+    let of_drape = |drape: &Drape| -> Vec<Vec<[f64; 3]>> {
+        let garments = drape.garments.iter();
+        garments.map(|g| local_offsets(&g.positions, &g.skinned, &g.transforms)).collect()
+    };
+    let offsets: Vec<_> = drapes.par_iter().map(of_drape).collect();
     let weights = binomial(radius);
     let smoothed: Vec<Option<(usize, Drape)>> = (0..drapes.len())
         .into_par_iter()
@@ -70,7 +77,7 @@ fn smoothed_frame(
     offsets: &[Vec<Vec<[f64; 3]>>],
     frame: usize,
     weights: &[f64],
-) -> Result<Option<(usize, Drape)>, DraperError> {
+) -> Result<Option<(usize, Drape)>, Report> {
     let drape = &drapes[frame];
     let wanted: Vec<Vec<[f64; 3]>> = drape
         .garments
@@ -78,13 +85,10 @@ fn smoothed_frame(
         .enumerate()
         .map(|(g, garment)| {
             let mean = averaged(|other| &offsets[other][g], offsets.len(), frame, weights);
-            let vertices = garment.skinned.iter().zip(&garment.transforms).zip(mean);
-            vertices
-                .map(|((start, transform), offset)| add(*start, out_of_frame(transform, offset)))
-                .collect()
+            from_offsets(&garment.skinned, &garment.transforms, mean)
         })
         .collect();
-    for (number, share) in SHARES.into_iter().enumerate() {
+    for (number, share) in SMOOTHING_SHARES.into_iter().enumerate() {
         let mut candidate = drape.clone();
         for (garment, wanted) in candidate.garments.iter_mut().zip(&wanted) {
             let towards = |(p, w): (&[f64; 3], &[f64; 3])| add(*p, scale(sub(*w, *p), share));
@@ -138,13 +142,24 @@ pub(super) fn averaged<'a>(
     sum.into_iter().map(|s| scale(s, 1.0 / total)).collect()
 }
 
-/// Offsets from skinning in the frames of the skinning transforms, per garment.
-fn local_offsets(drape: &Drape) -> Vec<Vec<[f64; 3]>> {
-    let of = |garment: &super::GarmentDrape| {
-        let vertices = garment.positions.iter().zip(&garment.skinned).zip(&garment.transforms);
-        vertices.map(|((p, start), transform)| into_frame(transform, sub(*p, *start))).collect()
-    };
-    drape.garments.iter().map(of).collect()
+/// Offsets of `positions` from skinning, each in the frame of its skinning transform.
+pub(super) fn local_offsets(
+    positions: &[[f64; 3]],
+    skinned: &[[f64; 3]],
+    transforms: &[Transform],
+) -> Vec<[f64; 3]> {
+    let vertices = positions.iter().zip(skinned).zip(transforms);
+    vertices.map(|((p, start), transform)| into_frame(transform, sub(*p, *start))).collect()
+}
+
+/// The positions that have these [`local_offsets`].
+pub(super) fn from_offsets(
+    skinned: &[[f64; 3]],
+    transforms: &[Transform],
+    offsets: Vec<[f64; 3]>,
+) -> Vec<[f64; 3]> {
+    let vertices = skinned.iter().zip(transforms).zip(offsets);
+    vertices.map(|((start, transform), offset)| add(*start, out_of_frame(transform, offset))).collect()
 }
 
 #[cfg(test)]

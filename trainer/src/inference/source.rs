@@ -1,6 +1,5 @@
 //! A garment as it was given, and as the networks see it: which file or name, what was repaired, whose vertex is whose.
 
-use super::error::DraperError;
 use crate::config::Config;
 use crate::dataset::{DatasetError, GarmentLoader, GarmentSource};
 use crate::score::misplaced;
@@ -12,10 +11,10 @@ use clothcombo_data::folders::list_garment_folder;
 use clothcombo_data::format::folder::has_extension;
 use clothcombo_data::format::obj::texture_of_triangles;
 use clothcombo_data::format::{PolygonMesh, load_mesh};
-use clothcombo_data::generate::GarmentGenerator;
 use clothcombo_data::mesh::{Attachment, MeshMeasures, thickness};
 use clothcombo_physics::Surface;
 use clothcombo_physics::mesh::{Topology, TriMesh};
+use miette::{Report, miette};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -54,8 +53,8 @@ impl GivenGarment {
         body: &Body,
         always_fit: Option<bool>,
         hints: &FitSettings,
-    ) -> Result<Self, DraperError> {
-        Placement { body, always_fit, hints, check: &OnceLock::new() }.read(path)
+    ) -> Result<Self, Report> {
+        GarmentPlacement { body, always_fit, hints, check: &OnceLock::new() }.read(path)
     }
 
     /// Says what it is made of: constants of `material` come before those of its folder.
@@ -87,7 +86,7 @@ impl GivenGarment {
 
 /// How the mesh of a garment is brought to a body.
 #[derive(Clone, Copy)]
-struct Placement<'a> {
+struct GarmentPlacement<'a> {
     body: &'a Body,
     /// Whether it is fitted, where that is decided beforehand.
     always_fit: Option<bool>,
@@ -96,23 +95,26 @@ struct Placement<'a> {
     check: &'a OnceLock<Result<PlacementCheck, FitError>>,
 }
 
-impl Placement<'_> {
+impl GarmentPlacement<'_> {
     /// Refuses hints about a garment `name` that is taken as it is.
-    fn check_hints(&self, name: &str) -> Result<(), DraperError> {
+    fn check_hints(&self, name: &str) -> Result<(), Report> {
         match self.always_fit == Some(false) && *self.hints != FitSettings::default() {
-            true => Err(DraperError::Unfitted { name: name.to_owned() }),
+            true => Err(miette!(
+                help = "leave --fit never out",
+                "{name}: --fit never takes garments as they are, so that nothing can be said about their files"
+            )),
             false => Ok(()),
         }
     }
 
     /// The garment of a mesh file.
-    fn read(self, path: &Path) -> Result<GivenGarment, DraperError> {
+    fn read(self, path: &Path) -> Result<GivenGarment, Report> {
         let source = self.place(load_mesh(path).map_err(DatasetError::data)?, path)?;
         Ok(GivenGarment { path: Some(path.into()), ..source })
     }
 
     /// The garment of a mesh; `path` says in errors where it comes from.
-    fn place(self, given: PolygonMesh, path: &Path) -> Result<GivenGarment, DraperError> {
+    fn place(self, given: PolygonMesh, path: &Path) -> Result<GivenGarment, Report> {
         let Self { body, always_fit, hints, .. } = self;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let always_fit = always_fit.or((*hints != FitSettings::default()).then_some(true));
@@ -132,8 +134,13 @@ impl Placement<'_> {
             let garment = Garment { name, holding, ..Garment::new(category, rest) };
             return Ok(GivenGarment { given, ..GivenGarment::new(garment) });
         }
-        let fitted =
-            fit(&given, body, hints).map_err(|reason| DraperError::Fit { path: path.into(), reason })?;
+        let fitted = fit(&given, body, hints).map_err(|reason| {
+            miette!(
+                help = "hints about a file are those of `clothcombo fit --help`; `clothcombo check` lists defects",
+                "{}: {reason}",
+                path.display()
+            )
+        })?;
         let follows = fitted.follows;
         let garment = Garment { name, ..fitted.garment };
         Ok(GivenGarment { garment, given, path: None, fit: Some(fitted.report), follows })
@@ -150,7 +157,7 @@ impl Placement<'_> {
 
 /// Whether every piece of a mesh that is taken as it is lies near the zero body: if not, it intersects nothing, and looks like a
 /// good drape.
-fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), DraperError> {
+fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), Report> {
     let zero = body.zero_body();
     let what = misplaced(rest, &zero).or_else(|| {
         let (topology, surface) = (Topology::new(rest), Surface::from_mesh(&zero));
@@ -158,7 +165,13 @@ fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), DraperErr
         let all: Vec<u32> = (0..topology.component_count as u32).collect();
         stray_pieces(rest.positions(), &topology, &surface, &all).first().map(ToString::to_string)
     });
-    what.map_or(Ok(()), |what| Err(DraperError::Place { path: path.into(), what }))
+    what.map_or(Ok(()), |what| {
+        Err(miette!(
+            help = "leave out --fit never: unit, axes and place are then found",
+            "{}: {what}",
+            path.display()
+        ))
+    })
 }
 
 /// Whether every edge, face and vertex of a mesh is as it should be.
@@ -180,7 +193,7 @@ impl GarmentCatalog {
     ///
     /// # Errors
     /// When one of `folders` cannot be listed.
-    pub fn new(folders: &[PathBuf], config: &Config) -> Result<Self, DraperError> {
+    pub fn new(folders: &[PathBuf], config: &Config) -> Result<Self, DatasetError> {
         let mut catalog = Self { names: Vec::new(), sources: HashMap::new(), placement: OnceLock::new() };
         for folder in folders {
             let listed = list_garment_folder(folder).map_err(DatasetError::data)?;
@@ -196,10 +209,7 @@ impl GarmentCatalog {
 
     fn extend(&mut self, sources: impl IntoIterator<Item = GarmentSource>) {
         for origin in sources {
-            let name = match &origin {
-                GarmentSource::File(listed) => listed.name.clone(),
-                GarmentSource::Generated { category, seed, .. } => GarmentGenerator::name(*category, *seed),
-            };
+            let name = origin.name();
             if !self.sources.contains_key(&name) {
                 self.names.push(name.clone());
                 self.sources.insert(name, origin);
@@ -223,8 +233,8 @@ impl GarmentCatalog {
         body: &Body,
         always_fit: Option<bool>,
         hints: &FitSettings,
-    ) -> Result<GivenGarment, DraperError> {
-        let placement = Placement { body, always_fit, hints, check: &self.placement };
+    ) -> Result<GivenGarment, Report> {
+        let placement = GarmentPlacement { body, always_fit, hints, check: &self.placement };
         placement.check_hints(name)?;
         let mut source = placement.place(mesh, Path::new(name))?;
         source.garment.name = name.to_owned();
@@ -244,8 +254,8 @@ impl GarmentCatalog {
         body: &Body,
         always_fit: Option<bool>,
         hints: &FitSettings,
-    ) -> Result<GivenGarment, DraperError> {
-        let placement = Placement { body, always_fit, hints, check: &self.placement };
+    ) -> Result<GivenGarment, Report> {
+        let placement = GarmentPlacement { body, always_fit, hints, check: &self.placement };
         placement.check_hints(name)?;
         let path = Path::new(name);
         // A word without a dot or a slash is a name, not a file that happens to be missing.
@@ -255,12 +265,12 @@ impl GarmentCatalog {
         if is_path {
             return placement.read(path);
         }
-        let origin = self.sources.get(name).ok_or_else(|| DraperError::UnknownGarment {
-            name: name.to_owned(),
-            known: self.names.clone(),
-        })?;
+        let origin = self.sources.get(name).ok_or_else(|| unknown_garment(name, &self.names))?;
         if let (GarmentSource::Generated { .. }, true) = (origin, hints.is_placed()) {
-            return Err(DraperError::Generated { name: name.to_owned() });
+            return Err(miette!(
+                help = "leave them out, or say them in a file of outfits (--outfits) for the garments that they are about",
+                "{name} is made by the generator, on this body: --offset, --turn and --from-body are about files"
+            ));
         }
         let loader = GarmentLoader::new(body, std::slice::from_ref(origin))?;
         let GarmentSource::File(listed) = origin else {
@@ -279,7 +289,7 @@ impl GarmentCatalog {
             !made.as_ref().is_ok_and(|garment| lies(&garment.rest))
         });
         if must_fit {
-            let mut source = Placement { always_fit: Some(true), ..placement }.read(&listed.path)?;
+            let mut source = GarmentPlacement { always_fit: Some(true), ..placement }.read(&listed.path)?;
             source.garment.name.clone_from(&listed.name);
             source.add_material(listed.material);
             return Ok(source);
@@ -292,4 +302,25 @@ impl GarmentCatalog {
         source.path = Some(listed.path.clone());
         Ok(source)
     }
+}
+
+/// Names of garments that an error lists.
+const NAMES_SHOWN: usize = 12;
+
+fn unknown_garment(name: &str, known: &[String]) -> Report {
+    let (found, help) = match known.len() {
+        0 => (
+            "no folder of garments is known".to_owned(),
+            "pass a mesh file (.obj, .ply, .stl, .gltf, .glb), or --dataset FOLDER".to_owned(),
+        ),
+        n => {
+            let shown = known[..n.min(NAMES_SHOWN)].join(", ");
+            let help = match n {
+                n if n > NAMES_SHOWN => format!("for example {shown}, and {} more", n - NAMES_SHOWN),
+                _ => format!("the garments are: {shown}"),
+            };
+            (format!("none of the {n} known garments is called that"), help)
+        }
+    };
+    miette!(help = help, "no garment {name:?}: it is no file, and {found}")
 }

@@ -3,11 +3,12 @@
 //! A network knows one pose at a time, and a proposal is taken or not: from frame to frame a drape may jump by a millimetre
 //! where the body hardly moves. What is averaged is as in [`super::smooth`]; the post-process comes after it.
 
-use super::network_drape::NetworkDrape;
-use super::smooth::{averaged, binomial};
-use super::{BodyState, Draper, DraperError, Outfit};
-use clothcombo_physics::transform::{into_frame, out_of_frame};
-use clothcombo_physics::vec3::{add, sub};
+use super::bodies::BodyState;
+use super::draper::Draper;
+use super::network_drape::{NetworkDrape, SkinnedOutfit};
+use super::outfit::Outfit;
+use super::smooth::{averaged, binomial, from_offsets, local_offsets};
+use miette::Report;
 use std::collections::{BTreeMap, VecDeque};
 
 /// The frames of a motion as the networks make them, in order; each is made when it is first needed.
@@ -34,12 +35,13 @@ impl<'a> TemporalFilter<'a> {
     }
 
     /// Makes what is missing for the next frame.
-    fn make(&mut self) -> Result<(), DraperError> {
+    fn make(&mut self) -> Result<(), Report> {
         let radius = self.weights.len() / 2;
         for frame in self.next + self.made.len()..self.bodies.len().min(self.next + radius + 1) {
             let made = self.draper.network_drape(self.outfit, &self.bodies[frame])?;
             if radius > 0 {
-                self.offsets.insert(frame, offsets(&made));
+                let SkinnedOutfit { skinned, transforms, .. } = &made.start;
+                self.offsets.insert(frame, local_offsets(&made.network, skinned, transforms));
             }
             self.made.push_back(made);
         }
@@ -49,7 +51,7 @@ impl<'a> TemporalFilter<'a> {
 }
 
 impl Iterator for TemporalFilter<'_> {
-    type Item = Result<NetworkDrape, DraperError>;
+    type Item = Result<NetworkDrape, Report>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if let Err(error) = self.make() {
@@ -58,15 +60,9 @@ impl Iterator for TemporalFilter<'_> {
         let mut made = self.made.pop_front()?;
         if !self.offsets.is_empty() {
             let mean = averaged(|other| &self.offsets[&other], self.bodies.len(), self.next, &self.weights);
-            let vertices = made.start.skinned.iter().zip(&made.start.transforms).zip(mean);
-            made.network = vertices.map(|((p, t), offset)| add(*p, out_of_frame(t, offset))).collect();
+            made.network = from_offsets(&made.start.skinned, &made.start.transforms, mean);
         }
         self.next += 1;
         Some(Ok(made))
     }
-}
-
-fn offsets(made: &NetworkDrape) -> Vec<[f64; 3]> {
-    let vertices = made.network.iter().zip(&made.start.skinned).zip(&made.start.transforms);
-    vertices.map(|((p, start), transform)| into_frame(transform, sub(*p, *start))).collect()
 }

@@ -1,10 +1,11 @@
 //! Meshes to be scored, from files of any mesh format or from memory.
 
 use super::place::{misplaced, oversized, rescaled};
-use super::{DrapedGarment, MeshSize, Score, ScoreDistance, ScoreError, score};
-use clothcombo_data::format::{load_body_mesh, load_tri_mesh};
+use super::{DrapedGarment, Score, ScoreDistance, score};
+use clothcombo_data::format::{FileError, load_body_mesh, load_tri_mesh};
 use clothcombo_physics::mesh::{Topology, TriMesh, is_inside_out};
 use clothcombo_physics::vec3::{norm, sub};
+use miette::{Report, miette};
 use std::path::{Path, PathBuf};
 
 /// A mesh, and what messages call it: its file, or a name.
@@ -21,25 +22,25 @@ impl NamedMesh {
     ///
     /// # Errors
     /// Naming file and line.
-    pub fn load(path: &Path) -> Result<Self, ScoreError> {
-        Ok(Self { path: path.into(), mesh: load_tri_mesh(path)? })
+    pub fn load(path: &Path) -> Result<Self, Report> {
+        Ok(Self { path: path.into(), mesh: load_tri_mesh(path).map_err(|e| unreadable(&e))? })
     }
 
     /// Reads a body's mesh file; of a scene of several meshes the one named "body".
     ///
     /// # Errors
     /// Naming file and line.
-    pub fn load_body(path: &Path) -> Result<Self, ScoreError> {
-        Ok(Self { path: path.into(), mesh: load_body_mesh(path)? })
+    pub fn load_body(path: &Path) -> Result<Self, Report> {
+        Ok(Self { path: path.into(), mesh: load_body_mesh(path).map_err(|e| unreadable(&e))? })
     }
+}
 
-    fn size(&self) -> MeshSize {
-        MeshSize {
-            path: self.path.clone(),
-            vertices: self.mesh.vertex_count(),
-            triangles: self.mesh.face_count(),
-        }
-    }
+/// A mesh file is missing or wrong; the message names file and line.
+fn unreadable(reason: &FileError) -> Report {
+    miette!(
+        help = "every mesh is an OBJ, PLY, STL or glTF file of triangles, quads or polygons, in metres",
+        "{reason}"
+    )
 }
 
 /// The meshes of a scene.
@@ -55,41 +56,11 @@ pub struct SceneMeshes {
     pub canonical: Vec<NamedMesh>,
 }
 
-/// The files of a scene; polygons are cut into triangles.
-#[derive(Clone, Copy, Debug)]
-pub struct MeshFiles<'a> {
-    /// The posed body.
-    pub body: &'a Path,
-    /// Rest meshes, innermost first.
-    pub rest: &'a [PathBuf],
-    /// Draped meshes of the same vertices and faces, in the same order.
-    pub draped: &'a [PathBuf],
-    /// The same before skinning, for the holding energy; none leaves it out.
-    pub canonical: &'a [PathBuf],
-}
-
-/// Scores the meshes of `files`; a garment is named after its draped file.
+/// Scores meshes; a garment is named after its draped mesh.
 ///
 /// # Errors
-/// [`ScoreError`] naming file and line, or the two files that do not fit together.
-pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, ScoreError> {
-    let MeshFiles { body, rest, draped, canonical } = *files;
-    check_counts(rest.len(), draped.len(), canonical.len())?;
-    let load = |paths: &[PathBuf]| -> Result<Vec<_>, ScoreError> {
-        paths.iter().map(|path| NamedMesh::load(path)).collect()
-    };
-    let body = NamedMesh::load_body(body)?;
-    score_meshes(
-        SceneMeshes { body, rest: load(rest)?, draped: load(draped)?, canonical: load(canonical)? },
-        distance,
-    )
-}
-
-/// The same for meshes in memory; a garment is named after its draped mesh.
-///
-/// # Errors
-/// [`ScoreError`] naming the two meshes that do not fit together.
-pub fn score_meshes(meshes: SceneMeshes, distance: ScoreDistance) -> Result<Score, ScoreError> {
+/// Naming the two meshes that do not fit together.
+pub fn score_meshes(meshes: SceneMeshes, distance: ScoreDistance) -> Result<Score, Report> {
     let SceneMeshes { body, rest, draped, canonical } = meshes;
     check_counts(rest.len(), draped.len(), canonical.len())?;
     let body = checked_body(body)?;
@@ -113,8 +84,13 @@ pub fn score_meshes(meshes: SceneMeshes, distance: ScoreDistance) -> Result<Scor
     score(&body, &garments, distance)
 }
 
-fn check_counts(rest: usize, draped: usize, canonical: usize) -> Result<(), ScoreError> {
-    let wrong = |what, found| Err(ScoreError::FileCounts { rest, what, found });
+fn check_counts(rest: usize, draped: usize, canonical: usize) -> Result<(), Report> {
+    let wrong = |what: &str, found: usize| {
+        Err(miette!(
+            help = "give each garment once in every list, from the body outwards",
+            "{rest} rest meshes (--rest) but {found} {what} meshes (--{what})"
+        ))
+    };
     match (rest == draped, canonical == 0 || canonical == rest) {
         (false, _) => wrong("draped", draped),
         (_, false) => wrong("canonical", canonical),
@@ -126,11 +102,15 @@ fn check_counts(rest: usize, draped: usize, canonical: usize) -> Result<(), Scor
 ///
 /// # Errors
 /// When it is not in metres.
-pub fn checked_body(body: NamedMesh) -> Result<TriMesh, ScoreError> {
+pub fn checked_body(body: NamedMesh) -> Result<TriMesh, Report> {
     let NamedMesh { path, mesh } = body;
     warn_about_openings(&path, &mesh);
     if let Some(what) = oversized(&mesh) {
-        return Err(ScoreError::BodySize { path, what });
+        return Err(miette!(
+            help = "scale body and garments to metres (0.01 for centimetres)",
+            "{}: {what}",
+            path.display()
+        ));
     }
     if !is_inside_out(&mesh) {
         return Ok(mesh);
@@ -161,38 +141,56 @@ fn warn_about_openings(path: &Path, body: &TriMesh) {
 ///
 /// # Errors
 /// When they are not.
-pub fn checked_garment(rest: &NamedMesh, draped: &NamedMesh, body: &TriMesh) -> Result<String, ScoreError> {
+pub fn checked_garment(rest: &NamedMesh, draped: &NamedMesh, body: &TriMesh) -> Result<String, Report> {
     check_faces(rest, draped)?;
     if let Some(what) = misplaced(&draped.mesh, body) {
-        return Err(ScoreError::Place { path: draped.path.clone(), what });
+        return Err(miette!(
+            help = "body and garments must be in one unit and one place: as draped",
+            "{}: {what}",
+            draped.path.display()
+        ));
     }
     check_unit(rest, draped)?;
     let path = &draped.path;
     Ok(path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned())
 }
 
-fn check_unit(rest: &NamedMesh, draped: &NamedMesh) -> Result<(), ScoreError> {
+fn check_unit(rest: &NamedMesh, draped: &NamedMesh) -> Result<(), Report> {
     match rescaled(&rest.mesh, &draped.mesh) {
-        Some(what) => {
-            Err(ScoreError::RestUnit { rest: rest.path.clone(), draped: draped.path.clone(), what })
-        }
+        Some(what) => Err(miette!(
+            help = "rest and draped meshes must be in one unit: metres",
+            "{} beside {}: {what}",
+            rest.path.display(),
+            draped.path.display()
+        )),
         None => Ok(()),
     }
 }
 
-fn check_faces(rest: &NamedMesh, draped: &NamedMesh) -> Result<(), ScoreError> {
-    let (a, b) = (&rest.mesh, &draped.mesh);
-    if (a.vertex_count(), a.face_count()) != (b.vertex_count(), b.face_count()) {
-        return Err(ScoreError::Size { rest: rest.size(), draped: draped.size() });
+fn check_faces(rest: &NamedMesh, draped: &NamedMesh) -> Result<(), Report> {
+    let [at_rest, now] = [rest, draped].map(|named| named.path.display());
+    let [a, b] = [rest, draped].map(|named| (named.mesh.vertex_count(), named.mesh.face_count()));
+    if a != b {
+        return Err(miette!(
+            help = "a draped mesh must be its rest mesh with moved vertices; check the order of the files, and that the \
+                    program that wrote them neither split nor merged vertices",
+            "{now} has {} vertices and {} triangles, {at_rest} has {} and {}",
+            b.0,
+            b.1,
+            a.0,
+            a.1
+        ));
     }
-    match (0..a.face_count()).find(|&f| a.faces()[f] != b.faces()[f]) {
-        Some(face) => Err(ScoreError::Faces {
-            face,
-            rest: rest.size(),
-            rest_face: a.faces()[face],
-            draped: draped.size(),
-            draped_face: b.faces()[face],
-        }),
+    let mut faces = rest.mesh.faces().iter().zip(draped.mesh.faces()).enumerate();
+    match faces.find(|(_, (of_rest, of_draped))| of_rest != of_draped) {
+        Some((face, (of_rest, of_draped))) => Err(miette!(
+            help = "a draped mesh must have the faces of its rest mesh in the same order; triangles and vertices count from 0 \
+                    here, after polygons were cut into triangles",
+            "face {face} has the vertices {of_draped:?} in {now} ({} vertices, {} triangles) but {of_rest:?} in {at_rest} \
+             (the same counts)",
+            b.0,
+            b.1
+        )),
         None => Ok(()),
     }
 }

@@ -1,29 +1,26 @@
 //! Scores of anyone's draped garments. In: meshes of a body and of garments at rest and draped. Out: every energy in the paper's
 //! printed form ([`EnergySettings::printed`]), penetration of the body, exact triangle intersections, order of the layers.
 //!
-//! Nothing is measured here: energies come from [`SceneEnergy::raw`], contacts from [`contact::Report`](Report). This file
+//! Nothing is measured here: energies come from [`SceneEnergy::raw`], contacts from [`contact::Report`]. This file
 //! fixes the definitions and the form of the answer.
 
-mod error;
 mod files;
 mod place;
 #[cfg(test)]
 mod tests;
 
-pub use error::{MeshSize, ScoreError};
-pub use files::{
-    MeshFiles, NamedMesh, SceneMeshes, checked_body, checked_garment, score_files, score_meshes,
-};
+pub use files::{NamedMesh, SceneMeshes, checked_body, checked_garment, score_meshes};
 pub(crate) use place::misplaced;
 
 use crate::config::LossesConfig;
 use crate::dataset::objective::scene_weights;
-use clothcombo_physics::contact::{CountedBody, LayerOrder, Report, ReportGarment, Selection};
+use clothcombo_physics::contact::{self, CountedBody, LayerOrder, ReportGarment, Selection};
 use clothcombo_physics::energy::{
     EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers, Term, TermMap,
 };
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::query::{Distance, Surface};
+use miette::{Report, miette};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -145,12 +142,8 @@ pub struct DrapedGarment<'a> {
 /// Scores `garments`, innermost first, on the posed `body`.
 ///
 /// # Errors
-/// [`ScoreError`] naming the garment whose positions, rest shape or values cannot be used.
-pub fn score(
-    body: &TriMesh,
-    garments: &[DrapedGarment],
-    distance: ScoreDistance,
-) -> Result<Score, ScoreError> {
+/// Naming the garment whose positions, rest shape or values cannot be used.
+pub fn score(body: &TriMesh, garments: &[DrapedGarment], distance: ScoreDistance) -> Result<Score, Report> {
     let settings = EnergySettings { distance: distance.into(), ..EnergySettings::printed() };
     let surface = Arc::new(Surface::<f64>::from_mesh(&used_part(body)));
     let pairs: Vec<(usize, usize)> =
@@ -182,27 +175,26 @@ pub fn score(
         garments.iter().map(|g| ReportGarment { positions: g.positions, faces: g.rest.faces() }).collect();
     let order = LayerOrder::NearestVertex;
     let selection = Selection { layers: &pairs, order, triangles: true, body_itself: true };
-    let report = Report::count(&CountedBody::new(&surface, distance.into()), &meshes, &selection);
+    let report = contact::Report::count(&CountedBody::new(&surface, distance.into()), &meshes, &selection);
 
-    let garment_scores =
-        garments.iter().enumerate().map(|(i, garment)| -> Result<GarmentScore, ScoreError> {
-            let (found, inside) = (&report.garments[i], report.garments[i].penetration(0.0));
-            Ok(GarmentScore {
-                name: garment.name.to_owned(),
-                vertices: garment.rest.vertex_count(),
-                triangles: garment.rest.face_count(),
-                raw: named(garment.name, &value.garments[i], |_| 1.0)?,
-                weighted: named(garment.name, &value.garments[i], |term| weights.garments[i][term])?,
-                penetration: PenetrationScore {
-                    vertices_inside: inside.inside as f64 / inside.vertices as f64,
-                    max_depth_mm: 1e3 * inside.max_depth,
-                    body_triangle_pairs: found.with_body.pairs.len(),
-                    self_triangle_pairs: found.with_itself.pairs.len(),
-                },
-            })
-        });
+    let garment_scores = garments.iter().enumerate().map(|(i, garment)| -> Result<GarmentScore, Report> {
+        let (found, inside) = (&report.garments[i], report.garments[i].penetration(0.0));
+        Ok(GarmentScore {
+            name: garment.name.to_owned(),
+            vertices: garment.rest.vertex_count(),
+            triangles: garment.rest.face_count(),
+            raw: named(garment.name, &value.garments[i], |_| 1.0)?,
+            weighted: named(garment.name, &value.garments[i], |term| weights.garments[i][term])?,
+            penetration: PenetrationScore {
+                vertices_inside: inside.inside as f64 / inside.vertices as f64,
+                max_depth_mm: 1e3 * inside.max_depth,
+                body_triangle_pairs: found.with_body.pairs.len(),
+                self_triangle_pairs: found.with_itself.pairs.len(),
+            },
+        })
+    });
     let layer_scores =
-        value.layers.iter().zip(&report.layers).map(|(raw, layer)| -> Result<LayerScore, ScoreError> {
+        value.layers.iter().zip(&report.layers).map(|(raw, layer)| -> Result<LayerScore, Report> {
             let [under, over] = [layer.inner, layer.outer].map(|garment| garments[garment].name);
             let raw = named(&format!("{under} under {over}"), raw, |_| 1.0)?;
             Ok(LayerScore {
@@ -217,8 +209,8 @@ pub fn score(
     Ok(Score {
         settings: ScoreSettings { epsilon_mm: 1e3 * settings.body_collision_epsilon, distance },
         body: BodyScore { self_triangle_pairs: report.body_itself.pairs },
-        garments: garment_scores.collect::<Result<_, ScoreError>>()?,
-        layers: layer_scores.collect::<Result<_, ScoreError>>()?,
+        garments: garment_scores.collect::<Result<_, Report>>()?,
+        layers: layer_scores.collect::<Result<_, Report>>()?,
     })
 }
 
@@ -239,24 +231,22 @@ fn scene_garment(
     garment: &DrapedGarment,
     weights: TermMap<f64>,
     settings: &EnergySettings,
-) -> Result<SceneGarment<f64>, ScoreError> {
-    let name = || garment.name.to_owned();
+) -> Result<SceneGarment<f64>, Report> {
+    let name = garment.name;
     if let Some([face, first]) = garment.rest.doubled_face() {
-        return Err(ScoreError::DoubledFace { garment: name(), face, first });
+        return Err(miette!(
+            help = "remove one of them, or let `clothcombo fit` repair the rest mesh (triangles count from 0, after polygons \
+                    were cut)",
+            "garment '{name}': face {face} has the vertices of face {first}"
+        ));
     }
-    garment
-        .rest
-        .with_positions(garment.positions.to_vec())
-        .map_err(|reason| ScoreError::Positions { garment: name(), reason })?;
+    for positions in [Some(garment.positions), garment.canonical].into_iter().flatten() {
+        let moved = garment.rest.with_positions(positions.to_vec());
+        moved.map_err(|reason| miette!("garment '{name}': {reason}"))?;
+    }
     let is_held = garment.canonical.is_some();
-    if let Some(canonical) = garment.canonical {
-        garment
-            .rest
-            .with_positions(canonical.to_vec())
-            .map_err(|reason| ScoreError::Positions { garment: name(), reason })?;
-    }
     let energies = GarmentEnergies::new(garment.rest, &Topology::new(garment.rest), settings, is_held)
-        .map_err(|reason| ScoreError::Energy { garment: name(), reason })?;
+        .map_err(|reason| miette!("garment '{name}': {reason}"))?;
     Ok(SceneGarment {
         energies: Arc::new(energies),
         holding_reference: if is_held { garment.rest.positions().to_vec() } else { Vec::new() },
@@ -271,12 +261,16 @@ fn named(
     of: &str,
     values: &TermMap<Option<f64>>,
     factor: impl Fn(Term) -> f64,
-) -> Result<TermValues, ScoreError> {
+) -> Result<TermValues, Report> {
     let evaluated = values.iter().filter_map(|(term, value)| Some((term, (*value)? * factor(term))));
     evaluated
         .map(|(term, value)| match value.is_finite() {
             true => Ok((term.name().to_owned(), value)),
-            false => Err(ScoreError::Overflow { of: of.to_owned(), term: term.name(), value }),
+            false => Err(miette!(
+                help = "the coordinates are far outside a human body; all files must be in metres",
+                "'{of}' has a {} of {value}",
+                term.name()
+            )),
         })
         .collect()
 }

@@ -5,10 +5,10 @@ use clothcombo_physics::mesh::TriMesh;
 /// Larger bodies than this are not in metres (m).
 const TALLEST: f64 = 20.0;
 /// Sizes of a garment that are refused, as shares of the body's.
-const LARGEST: f64 = 5.0;
-const SMALLEST: f64 = 0.02;
+const LARGEST_SHARE: f64 = 5.0;
+const SMALLEST_SHARE: f64 = 0.02;
 /// A garment farther from the body than this share of the body's size is refused.
-const NEAR: f64 = 0.25;
+const NEAR_SHARE: f64 = 0.25;
 /// No cloth gets so many times as large as it is at rest, or as small.
 const STRETCHED: f64 = 5.0;
 
@@ -22,11 +22,12 @@ pub(crate) fn oversized(body: &TriMesh) -> Option<String> {
 /// What tells that `garment` is in another unit or place than `body`, if anything does.
 pub(crate) fn misplaced(garment: &TriMesh, body: &TriMesh) -> Option<String> {
     let (own, whole) = (garment.extent(), body.extent());
-    if own > LARGEST * whole || own < SMALLEST * whole {
+    if own > LARGEST_SHARE * whole || own < SMALLEST_SHARE * whole {
         return Some(format!("the garment measures {own:.3}, the body {whole:.3} from end to end"));
     }
     let ((low, high), (body_low, body_high)) = (garment.bounds(), body.bounds());
-    let is_apart = |k: usize| low[k] > body_high[k] + NEAR * whole || high[k] < body_low[k] - NEAR * whole;
+    let is_apart =
+        |k: usize| low[k] > body_high[k] + NEAR_SHARE * whole || high[k] < body_low[k] - NEAR_SHARE * whole;
     let k = (0..3).find(|k| is_apart(*k))?;
     let axis = ["x", "y", "z"][k];
     Some(format!(

@@ -1,7 +1,6 @@
 //! A run in progress: everything the training loop acts on, and the parts of a step.
 
 use crate::config::Config;
-use crate::dataset::DataSizes;
 use crate::dataset::Dataset;
 use crate::evaluation::ValidationSet;
 use crate::evaluation::sample_picture;
@@ -109,7 +108,7 @@ impl Session {
     }
     /// Memory the run is expected to use; `None` where the system does not tell what is in use already.
     pub fn memory_estimate(&self) -> Option<MemoryEstimate> {
-        let (sizes, model) = (DataSizes::of(&self.dataset, &self.config.data), self.learner.model());
+        let (sizes, model) = (self.dataset.sizes(&self.config.data), self.learner.model());
         let on_processor = model.devices().iter().all(is_processor);
         let streams = self.config.data.cache.folder.is_some();
         let estimate = MemoryEstimate::new(&self.config, &sizes, model.num_params(), on_processor);

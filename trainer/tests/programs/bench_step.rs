@@ -16,7 +16,7 @@ fn bench(arguments: &[&str], folder: &Path) -> Command {
 #[test]
 fn shares_add_up_and_one_garment_costs_no_untangling() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = ["--widths", "8", "--layers", "1,2", "--json", "--picture", "step.png"];
+    let arguments = ["--widths", "8", "--layers", "1,2", "--json"];
     let output = bench(&arguments, folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -31,7 +31,6 @@ fn shares_add_up_and_one_garment_costs_no_untangling() {
         assert_eq!(layers > 1, untangling > 0.0, "{layers} layers, {untangling} ms of untangling");
         assert!(case["costs"]["terms_ms"]["strain"].as_f64().unwrap() > 0.0);
     }
-    assert!(image::open(folder.path().join("step.png")).unwrap().width() > 500);
 }
 
 #[test]

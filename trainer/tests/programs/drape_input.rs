@@ -4,6 +4,7 @@ use crate::common::holds;
 use crate::drape::{SKIRT, TEE, at, drape, failure, report, run_folder, save_motion};
 use assert_cmd::Command;
 use clothcombo_data::format::{load_mesh, load_tri_mesh, obj};
+use clothcombo_data::generate::mannequin;
 use clothcombo_physics::mesh::shapes::{icosphere, mapped, tube, union};
 use std::fs;
 use std::path::Path;
@@ -119,6 +120,44 @@ fn wrong_input_names_itself_and_leaves_nothing() {
     assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
     let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert!(left.iter().all(|n| !n.to_string_lossy().ends_with(".tmp")), "{left:?}");
+}
+
+#[test]
+fn a_body_mesh_in_another_unit_or_place_is_named_with_its_flag() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = at(&folder, "out");
+    let person = |name: &str, scale: f64, x_of_middle: f64| {
+        let (path, body) = (at(&folder, name), mannequin());
+        let moved = body.template.iter().map(|[x, y, z]| [scale * x + x_of_middle, scale * y, scale * z]);
+        obj::save(Path::new(&path), &moved.collect::<Vec<_>>(), &body.faces, &[]).unwrap();
+        path
+    };
+    let good = person("good.obj", 1.0, 0.0);
+    let (in_cm, remote) = (person("in_cm.obj", 100.0, 0.0), person("remote.obj", 1.0, 2000.0));
+    for (arguments, words) in [
+        (vec!["--posed", &in_cm], ["× --posed", "in_cm.obj: the mesh measures 1"]),
+        (vec!["--posed", &remote], ["× --posed", "remote.obj: vertex 0 (from 0) is at ["]),
+        (vec!["--posed", &good, "--t-pose", &in_cm], ["× --t-pose", "in_cm.obj: the mesh measures 1"]),
+    ] {
+        let message = failure(drape(&["--garments", TEE, "-o", &out]).args(&arguments), 1);
+        for word in words.into_iter().chain(["help: the mesh must be a pose of the body model", "metres"]) {
+            assert!(holds(&message, word), "{word:?} is missing for {arguments:?} in:\n{message}");
+        }
+    }
+    assert!(!Path::new(&out).exists());
+}
+
+#[test]
+fn numbers_that_make_no_sense_are_refused_with_their_flag() {
+    let folder = tempfile::tempdir().unwrap();
+    for (flag, value, words) in [
+        ("--refine", "100000", "it must be at most 1000 steps, or auto"),
+        ("--shape", "0.5,nan", "a finite number from -20 to 20"),
+        ("--shape", "1e9", "a finite number from -20 to 20"),
+    ] {
+        let message = failure(drape(&["--garments", TEE, "-o", &at(&folder, "out")]).args([flag, value]), 2);
+        assert!(message.contains(flag) && message.contains(words), "{message}");
+    }
 }
 
 #[test]

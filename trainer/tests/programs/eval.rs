@@ -244,7 +244,7 @@ fn a_file_in_the_place_of_the_report_is_an_error_before_anything_is_loaded() {
     for output in [file.clone(), file.join("report")] {
         // The model is not there either: it would be missed first.
         let output = clothcombo(&["eval", "--checkpoint", "nowhere", "-o", output.to_str().unwrap()]);
-        assert_eq!(output.status.code(), Some(1));
+        assert_eq!(output.status.code(), Some(2));
         assert!(holds(&said(&output), "thesis.tex is a file, not a folder"), "{}", said(&output));
     }
 }

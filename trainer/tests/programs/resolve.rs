@@ -156,6 +156,36 @@ fn without_time_what_is_there_is_returned_and_listed() {
 }
 
 #[test]
+fn pairs_that_are_left_come_with_a_hint() {
+    let case = Case::new();
+    // A sheet through the middle of the ball, which has no side to go to.
+    let mut sheet = String::new();
+    for i in 0..441 {
+        writeln!(sheet, "v {} 0.001 {}", 0.03 * f64::from(i / 21 - 10), 0.03 * f64::from(i % 21 - 10))
+            .unwrap();
+    }
+    for i in (0..420).filter(|i| i % 21 < 20) {
+        writeln!(sheet, "f {} {} {} {}", i + 1, i + 2, i + 23, i + 22).unwrap();
+    }
+    case.write("sheet.obj", &sheet);
+    let printed = |garment: &str, extra: &[&str]| {
+        let output = case.command(&[garment], extra).assert().success();
+        String::from_utf8_lossy(&output.get_output().stdout).into_owned()
+    };
+    let text = printed("sheet.obj", &["-o", "left"]);
+    assert!(
+        text.contains(" pairs left, listed in report.json; hint: another order of the garments"),
+        "{text}"
+    );
+    let text = printed("sheet.obj", &["-o", "stopped", "--time-limit", "1e-9"]);
+    assert!(
+        text.contains("stopped after its budget") && text.contains("hint: a longer --time-limit"),
+        "{text}"
+    );
+    assert!(!printed("tee.obj", &["-o", "clear"]).contains("hint"));
+}
+
+#[test]
 fn strain_is_measured_against_the_rest_meshes() {
     let case = Case::new();
     case.write("rest/tee.obj", &quad_tube(0.14, 40, 12));

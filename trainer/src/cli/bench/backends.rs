@@ -6,12 +6,11 @@ use crate::cli::table::{markdown, row};
 use crate::cli::values::{measuring_seconds, not_negative};
 use crate::cli::verbosity::print_status;
 use crate::system::device::DeviceChoice;
-use crate::training::measure::{BenchmarkRun, Case, NETWORKS};
+use crate::training::measure::{BenchmarkRun, Case};
 use burn::tensor::Device;
 use clap::Parser;
 use miette::{Report, miette};
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// Whether all compute devices of this build agree on loss and gradients, and how fast they are
 #[derive(Parser)]
@@ -51,15 +50,13 @@ pub struct Arguments {
 }
 
 #[derive(Serialize)]
-struct Measured {
+struct DeviceCosts {
     device: String,
     loss: f64,
     /// Relative difference to the first device.
     loss_difference: f64,
     /// Largest difference of a coordinate of a draped vertex, posed or canonical (m).
     position_difference_m: f64,
-    /// Relative differences of the gradients of every network, of all its parameters together; null where there is none.
-    gradient_differences: BTreeMap<&'static str, Option<f64>>,
     /// Largest relative difference over single parameters, and whose it is.
     gradient_difference: f64,
     parameter: String,
@@ -98,15 +95,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         let worst = differences.max_by(|a, b| a.0.total_cmp(&b.0));
         let found_positions = run.host_drape(&scene)?;
         let costs = run.costs(arguments.seconds, 1)?;
-        rows.push(Measured {
+        rows.push(DeviceCosts {
             device: choice.to_string(),
             loss: found_loss,
             loss_difference: ((found_loss - loss) / loss).abs(),
             position_difference_m: largest_distance(&found_positions, &positions),
-            gradient_differences: NETWORKS
-                .into_iter()
-                .map(|network| (network, network_difference(network, &found, &gradients)))
-                .collect(),
             gradient_difference: worst.as_ref().map_or(0.0, |worst| worst.0),
             parameter: worst.map(|worst| worst.1.clone()).unwrap_or_default(),
             forward_ms: costs.forward_ms,
@@ -114,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         });
     }
     print_report(arguments.json, &rows, |rows| text(rows))?;
-    let agrees = |row: &&Measured| {
+    let agrees = |row: &&DeviceCosts| {
         row.loss_difference <= arguments.most_loss
             && row.gradient_difference <= arguments.most_gradient
             && row.position_difference_m <= arguments.most_position
@@ -150,20 +143,6 @@ fn largest_distance(found: &[Vec<[f32; 3]>; 2], expected: &[Vec<[f32; 3]>; 2]) -
         .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a })
 }
 
-/// The [`difference`] over all parameters of a network; `None` where it has no gradient.
-fn network_difference(
-    network: &str,
-    found: &[(String, Vec<f32>)],
-    expected: &[(String, Vec<f32>)],
-) -> Option<f64> {
-    let join = |gradients: &[(String, Vec<f32>)]| -> Vec<f32> {
-        let of_network = gradients.iter().filter(|(name, _)| name.split('.').next() == Some(network));
-        of_network.flat_map(|(_, values)| values.iter().copied()).collect()
-    };
-    let expected = join(expected);
-    (!expected.is_empty()).then(|| difference(&join(found), &expected))
-}
-
 /// Norm of the difference over the norm of `expected`; infinite where the sizes differ.
 fn difference(found: &[f32], expected: &[f32]) -> f64 {
     if found.len() != expected.len() {
@@ -174,8 +153,8 @@ fn difference(found: &[f32], expected: &[f32]) -> f64 {
     if apart == 0.0 { 0.0 } else { apart / norm(&mut expected.iter().map(|v| f64::from(*v))) }
 }
 
-fn text(rows: &[Measured]) -> String {
-    let row = |measured: &Measured| {
+fn text(rows: &[DeviceCosts]) -> String {
+    let row = |measured: &DeviceCosts| {
         row! {
             "device" => measured.device,
             "loss" => format!("{:.6}", measured.loss),

@@ -4,29 +4,25 @@ use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::output::print_report;
 use crate::cli::table::{Cell, Row, markdown, row};
-use crate::cli::values::{at_least_one, folder_to_make, measuring_seconds, picture_file};
+use crate::cli::values::{at_least_one, folder_to_make, measuring_seconds};
 use crate::cli::verbosity::print_status;
 use crate::config::{Config, load};
-use crate::picture::chart::{Bar, draw_bars};
-use crate::picture::save_png;
 use crate::system::device::name;
-use crate::training::measure::{BenchmarkRun, Case, Costs, PHASES, Profile, export};
+use crate::training::measure::{BenchmarkRun, Case, Costs, Profile, export};
 use burn::module::Module;
 use burn::tensor::Device;
 use clap::Parser;
 use clothcombo_physics::energy::Term;
-use miette::{IntoDiagnostic, Report, miette};
+use miette::{Report, miette};
 use serde::Serialize;
 use std::path::PathBuf;
 
 /// Where the time of a training step goes
 #[derive(Parser)]
-#[command(
-    after_help = "Examples:\n  clothcombo bench step --widths 64,128 --layers 1,3 --picture step.png\n  \
-        clothcombo bench step --config configs/open.toml --picture open.png --json > open.json\n  \
+#[command(after_help = "Examples:\n  clothcombo bench step --widths 64,128 --layers 1,3\n  \
+        clothcombo bench step --config configs/open.toml --json > open.json\n  \
         clothcombo bench step --config configs/paper.toml --stage 1 --set model.width=64 --export case\n\n\
-        Two threads and fewer: RAYON_NUM_THREADS=2. Nothing else should run meanwhile."
-)]
+        Two threads and fewer: RAYON_NUM_THREADS=2. Nothing else should run meanwhile.")]
 pub struct Arguments {
     /// Measures the stages of this configuration instead of synthetic runs
     #[arg(long, value_name = "FILE", conflicts_with_all = ["widths", "layers", "vertices", "eigen_count", "blocks", "bodies"])]
@@ -66,9 +62,6 @@ pub struct Arguments {
     seconds: f64,
     #[command(flatten)]
     device: DeviceArgument,
-    /// Writes the shares of a step as stacked bars (PNG)
-    #[arg(long, value_name = "FILE", value_parser = picture_file())]
-    picture: Option<PathBuf>,
     /// Writes scene, networks and results of the only case or stage into a folder, for scripts/bench_torch.py
     #[arg(long, value_name = "DIR", value_parser = folder_to_make())]
     export: Option<PathBuf>,
@@ -82,7 +75,7 @@ pub struct Arguments {
 
 /// Results of one case.
 #[derive(Clone, Debug, Serialize)]
-struct Measured {
+struct CaseCosts {
     name: String,
     /// Absent for a stage of a configuration.
     sizes: Option<Case>,
@@ -109,9 +102,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     if arguments.export_only {
         return Ok(());
     }
-    if let Some(path) = &arguments.picture {
-        save_png(&picture(&measured), path).into_diagnostic()?;
-    }
     let report = serde_json::json!({
         "threads": rayon::current_num_threads(),
         "device": name(&device),
@@ -120,7 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     print_report(arguments.json, &report, |_| tables(&measured))
 }
 
-fn synthetic(arguments: &Arguments, device: &Device) -> Result<Vec<Measured>, Report> {
+fn synthetic(arguments: &Arguments, device: &Device) -> Result<Vec<CaseCosts>, Report> {
     let cases = cases(arguments);
     if arguments.export.is_some() && cases.len() != 1 {
         return Err(miette!(
@@ -137,7 +127,7 @@ fn synthetic(arguments: &Arguments, device: &Device) -> Result<Vec<Measured>, Re
         let name = [&[case.name()][..], arguments.overrides.as_slice()].concat().join(", ");
         measure(&mut run, name, Some(case), arguments)
     });
-    flattened(measured)
+    measured.filter_map(Result::transpose).collect()
 }
 
 /// Every combination of the sizes.
@@ -157,7 +147,7 @@ fn cases(arguments: &Arguments) -> Vec<Case> {
     }
 }
 
-fn stages(arguments: &Arguments, config: Config, device: &Device) -> Result<Vec<Measured>, Report> {
+fn stages(arguments: &Arguments, config: Config, device: &Device) -> Result<Vec<CaseCosts>, Report> {
     let names: Vec<String> = config.stages.iter().map(|stage| stage.name.clone()).collect();
     let all =
         || names.iter().enumerate().map(|(i, name)| format!("{i} {name:?}")).collect::<Vec<_>>().join(", ");
@@ -180,7 +170,7 @@ fn stages(arguments: &Arguments, config: Config, device: &Device) -> Result<Vec<
         let mut run = BenchmarkRun::new(config.clone(), dataset.clone(), index, device)?;
         measure(&mut run, names[index].clone(), None, arguments)
     };
-    flattened(chosen.into_iter().map(stage))
+    chosen.into_iter().map(stage).filter_map(Result::transpose).collect()
 }
 
 /// Nothing where a case is only exported.
@@ -189,7 +179,7 @@ fn measure(
     name: String,
     sizes: Option<Case>,
     arguments: &Arguments,
-) -> Result<Option<Measured>, Report> {
+) -> Result<Option<CaseCosts>, Report> {
     if let Some(folder) = &arguments.export {
         export(run, folder)?;
     }
@@ -200,7 +190,7 @@ fn measure(
     let scene = run.scene(0)?;
     let costs = run.costs(arguments.seconds, arguments.accumulate)?;
     let profile = run.profile(arguments.steps)?;
-    Ok(Some(Measured {
+    Ok(Some(CaseCosts {
         name,
         sizes,
         layers: scene.garments.len(),
@@ -209,24 +199,6 @@ fn measure(
         profile,
         costs,
     }))
-}
-
-fn flattened(
-    measured: impl Iterator<Item = Result<Option<Measured>, Report>>,
-) -> Result<Vec<Measured>, Report> {
-    measured.filter_map(Result::transpose).collect()
-}
-
-fn picture(measured: &[Measured]) -> image::RgbImage {
-    let bars: Vec<Bar> = measured
-        .iter()
-        .map(|m| Bar {
-            label: m.name.clone(),
-            parts: m.profile.phases_ms.iter().map(|(_, ms)| *ms).collect(),
-            total: format!("{} ms", short(m.profile.step_ms)),
-        })
-        .collect();
-    draw_bars("Time of a training step by part", &PHASES, &bars)
 }
 
 /// Three digits.
@@ -240,8 +212,8 @@ fn short(ms: f64) -> String {
     }
 }
 
-fn tables(measured: &[Measured]) -> String {
-    let rows = |row: fn(&Measured) -> Row| measured.iter().map(row).collect::<Vec<_>>();
+fn tables(measured: &[CaseCosts]) -> String {
+    let rows = |row: fn(&CaseCosts) -> Row| measured.iter().map(row).collect::<Vec<_>>();
     format!(
         "Where the time of a training step goes, medians [ms].\n\n{}\n\
          Parts of one scene, medians [ms]; scenes are prepared on another thread.\n\n{}\n\
@@ -252,13 +224,13 @@ fn tables(measured: &[Measured]) -> String {
     )
 }
 
-fn phase_row(m: &Measured) -> Row {
+fn phase_row(m: &CaseCosts) -> Row {
     let mut row = row!["case" => m.name, "step" => short(m.profile.step_ms)];
     row.extend(m.profile.phases_ms.iter().map(|(name, ms)| ((*name).to_owned(), short(*ms))));
     row
 }
 
-fn cost_row(m: &Measured) -> Row {
+fn cost_row(m: &CaseCosts) -> Row {
     row! {
         "case" => m.name,
         "vertices" => m.vertices,
@@ -274,7 +246,7 @@ fn cost_row(m: &Measured) -> Row {
     }
 }
 
-fn term_row(m: &Measured) -> Row {
+fn term_row(m: &CaseCosts) -> Row {
     let ms = |term: Term| m.costs.terms_ms.get(term.name()).map(|ms| short(*ms));
     let mut row = row!["case" => m.name];
     row.extend(Term::ALL.map(|term| (term.name().to_owned(), ms(term).text())));

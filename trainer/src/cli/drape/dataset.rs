@@ -1,7 +1,7 @@
 //! The folders of `--dataset`: searched through as by `clothcombo check`.
 
 use clothcombo_data::check::{Target, find_targets, only_body};
-use miette::{Report as Failure, miette};
+use miette::{Report, miette};
 use std::path::{Path, PathBuf};
 
 /// What the folders hold.
@@ -18,7 +18,7 @@ impl DatasetFolders {
     ///
     /// # Errors
     /// When one of them cannot be read, lists what is not there, or holds no garment.
-    pub fn find(folders: &[PathBuf]) -> Result<Self, Failure> {
+    pub fn find(folders: &[PathBuf]) -> Result<Self, Report> {
         let mut found = Self::default();
         let mut targets = Vec::new();
         for folder in folders {

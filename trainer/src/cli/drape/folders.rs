@@ -1,11 +1,11 @@
 //! Where a drape keeps what it computes.
 
 use crate::system::paths::destination;
-use miette::{IntoDiagnostic, Report as Failure, miette};
+use miette::{IntoDiagnostic, Report, miette};
 use std::path::Path;
 
 /// Refuses a cache in the folder that is to be made.
-pub(super) fn check_cache(cache: Option<&Path>, output: &Path) -> Result<(), Failure> {
+pub(super) fn check_cache(cache: Option<&Path>, output: &Path) -> Result<(), Report> {
     let Some(cache) = cache else { return Ok(()) };
     let [inner, outer] = [cache, output].map(destination);
     match inner.into_diagnostic()?.starts_with(outer.into_diagnostic()?) {

@@ -1,19 +1,21 @@
 //! One outfit to be draped, and the bodies it is draped on.
 
+use crate::cli::values::shape_parameter;
 use crate::dataset::DatasetError;
-use crate::inference::{Bodies, Draper, FrameRange, file_and_frame, read_pose};
+use crate::inference::{Bodies, Draper, FrameRange, check_body_mesh, file_and_frame, read_pose};
 use clap::Args;
 use clothcombo_data::asset::{GarmentMaterial, KnownShape, Motion, Pose};
 use clothcombo_data::fit::FitSettings;
 use clothcombo_data::format::load_mesh;
-use miette::{Report as Failure, miette};
+use miette::{Report, miette};
 use std::path::{Path, PathBuf};
 
 /// Shape, pose or motion of the body.
 #[derive(Args, Clone, Debug, Default)]
 pub(super) struct SceneArguments {
     /// Shape parameters; missing ones are 0
-    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_name = "NUMBERS")]
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_name = "NUMBERS",
+          value_parser = shape_parameter)]
     pub shape: Vec<f64>,
     /// Pose: standing, walking, reaching, or a frame of a motion file, FILE.npz or FILE.npz:FRAME; default: the T-pose
     #[arg(long, value_name = "POSE", conflicts_with_all = ["motion", "posed"])]
@@ -37,7 +39,7 @@ pub(super) struct SceneArguments {
 
 /// A garment that is asked for.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct WantedGarment {
+pub(super) struct RequestedGarment {
     /// File or name.
     pub name: String,
     /// What is known about it.
@@ -52,7 +54,7 @@ pub(super) struct Job {
     /// Name of its folder among several.
     pub name: String,
     /// Innermost first.
-    pub garments: Vec<WantedGarment>,
+    pub garments: Vec<RequestedGarment>,
     /// The body.
     pub scene: SceneArguments,
 }
@@ -69,23 +71,27 @@ impl Job {
     }
 
     /// Reads pose, motion or meshes.
-    pub fn bodies(&self, draper: &Draper) -> Result<Bodies, Failure> {
+    pub fn bodies(&self, draper: &Draper) -> Result<Bodies, Report> {
         let (body, scene) = (draper.body(), &self.scene);
-        let read = |path: &Path| Ok::<_, Failure>(load_mesh(path).map_err(DatasetError::data)?.positions);
+        let read = |flag: &str, path: &Path| {
+            let positions = load_mesh(path).map_err(DatasetError::data)?.positions;
+            check_body_mesh(body, &format!("{flag} {}", path.display()), &positions)?;
+            Ok::<_, Report>(positions)
+        };
         if let Some(path) = &scene.motion {
             let motion = Motion::load(path).map_err(DatasetError::data)?;
             let (frames, every) = (scene.frames.unwrap_or_default(), scene.every.unwrap_or(1) as usize);
             let name = path.display().to_string();
-            return Ok(Bodies::in_motion(body, &scene.shape, &motion, &name, frames, every)?);
+            return Bodies::in_motion(body, &scene.shape, &motion, &name, frames, every);
         }
         if let Some(path) = &scene.posed {
-            let surface = read(path)?;
-            let rest = scene.t_pose.as_deref().map(read).transpose()?;
+            let surface = read("--posed", path)?;
+            let rest = scene.t_pose.as_deref().map(|path| read("--t-pose", path)).transpose()?;
             let known = match &rest {
                 Some(rest) => KnownShape::TPose(rest),
                 None => KnownShape::Parameters(&scene.shape),
             };
-            return Ok(Bodies::of_surface(body, surface, known, &path.display().to_string())?);
+            return Bodies::of_surface(body, surface, known, &path.display().to_string());
         }
         let (pose, name) = match &scene.pose {
             None => (Pose::t_pose(0), "T-pose"),
@@ -97,9 +103,9 @@ impl Job {
 
 /// `garments` in the order of `numbers`.
 pub(super) fn ordered(
-    garments: Vec<WantedGarment>,
+    garments: Vec<RequestedGarment>,
     numbers: Option<&[usize]>,
-) -> Result<Vec<WantedGarment>, Failure> {
+) -> Result<Vec<RequestedGarment>, Report> {
     let Some(numbers) = numbers else { return Ok(garments) };
     let mut sorted = numbers.to_vec();
     sorted.sort_unstable();

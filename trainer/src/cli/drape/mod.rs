@@ -13,8 +13,7 @@ use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::inference::output::{Show, Staged, write};
 use crate::inference::{
-    Bodies, DrapeProgress, Draper, DraperError, DraperSettings, MOST_RADIUS, Outfit, RefineSteps, Report,
-    log_repairs, warn_about_order,
+    Bodies, DrapeProgress, DrapeReport, Draper, DraperSettings, GivenGarment, MOST_RADIUS, RefineSteps,
 };
 use crate::system::files::write_json;
 use crate::system::paths::user_cache;
@@ -23,11 +22,11 @@ use clothcombo_data::asset::GarmentMaterial;
 use dataset::DatasetFolders;
 use folders::check_cache;
 use indicatif::ProgressBar;
-use job::{Job, WantedGarment, ordered};
-use miette::{IntoDiagnostic, Report as Failure, miette};
+use job::{Job, RequestedGarment, ordered};
+use miette::{IntoDiagnostic, Report, miette};
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
@@ -81,7 +80,7 @@ pub struct Arguments {
     #[arg(long, value_name = "KEY=VALUE,…", value_parser = GarmentMaterial::from_str)]
     material: Option<GarmentMaterial>,
     /// Steps of the static solver after networks and post-process that make no intersection, at most 2 cm each, until a vertex
-    /// is 5 cm from there; 0: none; `auto`: until a step gains less than 1 % of what all did, for at most two seconds [default: 4
+    /// is 5 cm from there; 0: none, at most 1000; `auto`: until a step gains less than 1 % of what all did, for at most two seconds [default: 4
     /// for one pose, 0 for a motion]
     #[arg(long, value_name = "STEPS|auto")]
     refine: Option<RefineSteps>,
@@ -152,7 +151,7 @@ impl Fit {
 /// # Errors
 /// When a file cannot be read or written, or something cannot be draped. Intersections that are left are no error: the
 /// certificate lists them.
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let jobs = jobs(arguments)?;
     if arguments.smooth.is_some_and(|radius| radius > 0) && jobs.iter().all(|job| job.scene.motion.is_none())
     {
@@ -175,28 +174,25 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     );
     let clock = Instant::now();
     // Everything is read before anything is draped, so that a wrong name in the last outfit fails at once.
-    let blame = |job: &Job, failure: Failure| match jobs.len() {
-        1 => failure,
-        _ => failure.wrap_err(format!("outfit {}", job.name)),
+    let blame = |job: &Job, failure: Report| match arguments.outfits {
+        None => failure,
+        Some(_) => failure.wrap_err(format!("outfit {}", job.name)),
     };
     let read = |job: &Job| {
-        let find = |garment: &WantedGarment| {
+        let find = |garment: &RequestedGarment| {
             let fit = arguments.fit.decided();
             let mut source = catalog.find(&garment.name, draper.body(), fit, &garment.hints)?;
             source.add_material(garment.material);
-            Ok::<_, DraperError>(source)
+            Ok(source)
         };
-        let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
-        Outfit::check(&sources)?;
-        sources.iter().for_each(log_repairs);
-        draper.log_materials(&sources);
-        warn_about_order(&sources);
+        let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, Report>>()?;
+        draper.check_garments(&sources)?;
         let bodies = job.bodies(&draper)?;
-        bodies.check(&draper)?;
+        draper.check_bodies(&bodies)?;
         Ok((sources, bodies))
     };
     let read = |job| read(job).map_err(|failure| blame(job, failure));
-    let wanted = jobs.iter().map(read).collect::<Result<Vec<_>, Failure>>()?;
+    let wanted = jobs.iter().map(read).collect::<Result<Vec<_>, Report>>()?;
     // A name says only now which file it stands for.
     let files = wanted.iter().flat_map(|(sources, _)| sources).filter_map(|source| source.path.clone());
     staged.keep(files.chain([draper.trained().folder.clone()]))?;
@@ -205,15 +201,33 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         drapes => progress_bar(drapes, "drapes {bar:30} {pos}/{len} · {eta} left{prefix}{msg}"),
     };
     bar.enable_steady_tick(Duration::from_millis(200));
+    let drape = |job: &Job, sources: Vec<GivenGarment>, bodies: &Bodies| -> Result<DrapeReport, Report> {
+        let (folder, outfit) = (staged.folder(), draper.outfit(sources)?);
+        let (drapes, smoothing) =
+            draper.drape_bodies(&outfit, bodies, arguments.smooth, show_progress(&bar))?;
+        bar.set_prefix("");
+        let title = match job.name.as_str() {
+            "outfit" => outfit.names().collect::<Vec<_>>().join(", "),
+            name => name.to_owned(),
+        };
+        let show = Show {
+            draper: &draper,
+            outfit: &outfit,
+            bodies,
+            drapes: &drapes,
+            smoothing: smoothing.as_ref(),
+            title: &title,
+            all_frames: arguments.all_frames,
+        };
+        match jobs.len() {
+            1 => write(folder, &show),
+            _ => write(&folder.join(&job.name), &show),
+        }
+    };
     let mut reports = Vec::new();
     for (job, (sources, bodies)) in jobs.iter().zip(wanted) {
-        let folder = match jobs.len() {
-            1 => staged.folder().to_owned(),
-            _ => staged.folder().join(&job.name),
-        };
-        let outfit = draper.outfit(sources).map_err(|e| blame(job, e.into()))?;
-        let report = drape_job(arguments, &draper, &outfit, job, &bodies, &folder, &bar);
-        reports.push((job.name.as_str(), report.map_err(|failure| blame(job, failure))?));
+        let report = drape(job, sources, &bodies).map_err(|failure| blame(job, failure))?;
+        reports.push((job.name.as_str(), report));
     }
     bar.finish_and_clear();
     if jobs.len() > 1 {
@@ -233,13 +247,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
+fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Report> {
     let hints = arguments.hints.settings().into_diagnostic()?;
     let material = arguments.material.unwrap_or_default();
     match &arguments.outfits {
         Some(file) => outfits::read(file, &arguments.scene, &hints, material),
         None => {
-            let wanted = |name: &String| WantedGarment { name: name.clone(), hints: hints.clone(), material };
+            let wanted =
+                |name: &String| RequestedGarment { name: name.clone(), hints: hints.clone(), material };
             let garments = arguments.garments.iter().map(wanted).collect();
             let garments = ordered(garments, arguments.order.as_deref())?;
             Ok(vec![Job { name: "outfit".to_owned(), garments, scene: arguments.scene.clone() }])
@@ -247,7 +262,7 @@ fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
     }
 }
 
-fn settings(arguments: &Arguments, body: Option<String>) -> Result<DraperSettings, Failure> {
+fn settings(arguments: &Arguments, body: Option<String>) -> Result<DraperSettings, Report> {
     let cache = match arguments.no_cache {
         true => None,
         false => arguments.cache.clone().or_else(user_cache),
@@ -261,33 +276,6 @@ fn settings(arguments: &Arguments, body: Option<String>) -> Result<DraperSetting
         post_process: arguments.post_process.settings(),
         ..DraperSettings::default()
     })
-}
-
-fn drape_job(
-    arguments: &Arguments,
-    draper: &Draper,
-    outfit: &Outfit,
-    job: &Job,
-    bodies: &Bodies,
-    folder: &Path,
-    bar: &ProgressBar,
-) -> Result<Report, Failure> {
-    let (drapes, smoothing) = draper.drape_bodies(outfit, bodies, arguments.smooth, show_progress(bar))?;
-    bar.set_prefix("");
-    let title = match job.name.as_str() {
-        "outfit" => outfit.names().collect::<Vec<_>>().join(", "),
-        name => name.to_owned(),
-    };
-    let show = Show {
-        draper,
-        outfit,
-        bodies,
-        drapes: &drapes,
-        smoothing: smoothing.as_ref(),
-        title: &title,
-        all_frames: arguments.all_frames,
-    };
-    Ok(write(folder, &show)?)
 }
 
 fn show_progress(bar: &ProgressBar) -> impl FnMut(DrapeProgress) {
@@ -310,13 +298,11 @@ fn show_progress(bar: &ProgressBar) -> impl FnMut(DrapeProgress) {
     }
 }
 
-fn print(arguments: &Arguments, reports: &[(&str, Report)]) -> Result<(), Failure> {
+fn print(arguments: &Arguments, reports: &[(&str, DrapeReport)]) -> Result<(), Report> {
     match (arguments.json, reports) {
-        (true, [(_, only)]) => return print_json(only),
+        (true, [(_, only)]) => print_json(only)?,
         (true, several) => {
-            return print_json(
-                &several.iter().map(|(name, report)| (name, report)).collect::<BTreeMap<_, _>>(),
-            );
+            print_json(&several.iter().map(|(name, report)| (name, report)).collect::<BTreeMap<_, _>>())?;
         }
         (false, [(_, only)]) => print!("{}", summary::tables(only)),
         (false, several) => {

@@ -1,10 +1,10 @@
 //! A TOML file of outfits.
 
-use super::job::{Job, SceneArguments, WantedGarment, ordered};
+use super::job::{Job, RequestedGarment, SceneArguments, ordered};
 use clothcombo_data::asset::GarmentMaterial;
 use clothcombo_data::fit::FitSettings;
 use clothcombo_data::fit::hints::GarmentEntry;
-use miette::{IntoDiagnostic, Report as Failure, WrapErr, miette};
+use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde::Deserialize;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -15,12 +15,12 @@ pub(super) const REPORT: &str = "report.json";
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Outfits {
-    outfit: Vec<Entry>,
+    outfit: Vec<OutfitEntry>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Entry {
+struct OutfitEntry {
     name: Option<String>,
     /// Names, or tables with a file and hints.
     garments: Vec<toml::Value>,
@@ -40,7 +40,7 @@ pub(super) fn read(
     scene: &SceneArguments,
     hints: &FitSettings,
     material: GarmentMaterial,
-) -> Result<Vec<Job>, Failure> {
+) -> Result<Vec<Job>, Report> {
     let text = std::fs::read_to_string(file)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot read {}", file.display()))?;
@@ -61,22 +61,19 @@ pub(super) fn read(
             _ => path.to_owned(),
         };
         let mut own = scene.clone();
+        if entry.pose.is_some() && entry.motion.is_some() {
+            return Err(wrong("both pose and motion".to_owned()));
+        }
         if entry.pose.is_some() || entry.motion.is_some() {
             (own.posed, own.t_pose) = (None, None);
+            own.pose = entry.pose.map(|pose| pose_beside(&pose, beside));
+            own.motion = entry.motion.map(|motion| beside(&motion.display().to_string()).into());
         }
         if let Some(shape) = entry.shape {
             if own.t_pose.is_some() {
                 return Err(wrong("a shape beside --t-pose, which has its own".to_owned()));
             }
             own.shape = shape;
-        }
-        match (entry.pose, entry.motion) {
-            (Some(_), Some(_)) => return Err(wrong("both pose and motion".to_owned())),
-            (Some(pose), None) => (own.pose, own.motion) = (Some(pose_beside(&pose, beside)), None),
-            (None, Some(motion)) => {
-                (own.pose, own.motion) = (None, Some(beside(&motion.display().to_string()).into()));
-            }
-            (None, None) => {}
         }
         let named_frames = entry.frames.is_some() || entry.every.is_some();
         if let Some(frames) = entry.frames {
@@ -99,9 +96,9 @@ pub(super) fn read(
         let garments = entry.garments.into_iter().enumerate().map(|(number, value)| {
             let wanted = garment(value, (hints, material), beside)
                 .map_err(|what| wrong(format!("garment {}: {what}", number + 1)))?;
-            Ok(WantedGarment { name: beside(&wanted.name), ..wanted })
+            Ok(RequestedGarment { name: beside(&wanted.name), ..wanted })
         });
-        let garments = ordered(garments.collect::<Result<_, Failure>>()?, entry.order.as_deref())
+        let garments = ordered(garments.collect::<Result<_, Report>>()?, entry.order.as_deref())
             .wrap_err_with(|| format!("outfit {name}"))?;
         Ok(Job { name, garments, scene: own })
     });
@@ -125,15 +122,15 @@ fn garment(
     value: toml::Value,
     (hints, material): (&FitSettings, GarmentMaterial),
     beside: impl Fn(&str) -> String,
-) -> Result<WantedGarment, String> {
+) -> Result<RequestedGarment, String> {
     match value {
-        toml::Value::String(name) => Ok(WantedGarment { name, hints: hints.clone(), material }),
+        toml::Value::String(name) => Ok(RequestedGarment { name, hints: hints.clone(), material }),
         toml::Value::Table(table) => {
             let entry: GarmentEntry =
                 table.try_into().map_err(|e: toml::de::Error| e.message().to_owned())?;
             entry.material.check()?;
             let material = entry.material.or(material);
-            Ok(WantedGarment { hints: entry.settings(hints, beside)?, name: entry.file, material })
+            Ok(RequestedGarment { hints: entry.settings(hints, beside)?, name: entry.file, material })
         }
         other => Err(format!(
             "it is of type {}, neither a name nor a table such as {{ file = \"tee.obj\", unit = \"cm\" }}",

@@ -1,20 +1,13 @@
 //! The report of a drape as tables for the terminal.
 
-use crate::cli::post_process::stopped;
-use crate::cli::table::{Cell, number, row, table};
-use crate::inference::{PhaseTimes, Report};
+use crate::cli::post_process::left_over;
+use crate::cli::score::term_cells;
+use crate::cli::table::{number, row, table};
+use crate::inference::{DrapeReport, PhaseTimes};
 use crate::score::Score;
 use clothcombo_physics::contact::resolve::Certificate;
 
-const TERMS: [(&str, &str); 5] = [
-    ("strain", "strain [J]"),
-    ("bending", "bending [J]"),
-    ("gravity", "gravity [J]"),
-    ("body_collision", "collision [m³]"),
-    ("repulsion", "repulsion [1]"),
-];
-
-pub(super) fn tables(report: &Report) -> String {
+pub(super) fn tables(report: &DrapeReport) -> String {
     let mut parts = vec![garments(report), times(report), scores(report)];
     if !report.certificate.layers.is_empty() {
         parts.push(layers(report));
@@ -23,7 +16,7 @@ pub(super) fn tables(report: &Report) -> String {
     parts.join("\n")
 }
 
-fn garments(report: &Report) -> String {
+fn garments(report: &DrapeReport) -> String {
     let rows = report.garments.iter().map(|g| {
         let repairs = g.fit.as_ref().map(|fit| fit.repairs.len());
         row! {
@@ -41,7 +34,7 @@ fn garments(report: &Report) -> String {
     table(&rows.collect::<Vec<_>>())
 }
 
-fn times(report: &Report) -> String {
+fn times(report: &DrapeReport) -> String {
     let row = |name: &str, times: &PhaseTimes| {
         let mut row = row!["time [ms]" => name];
         row.extend(times.phases().map(|(phase, ms)| (phase.to_string(), format!("{ms:.1}"))));
@@ -55,26 +48,25 @@ fn times(report: &Report) -> String {
 }
 
 /// Scores, the refinement and what the layers were before are those of a motion's first frame.
-fn of_first_frame(report: &Report, what: &str) -> String {
+fn of_first_frame(report: &DrapeReport, what: &str) -> String {
     if report.frames.len() > 1 { format!("{what}, first frame") } else { what.to_owned() }
 }
 
-fn scores(report: &Report) -> String {
+fn scores(report: &DrapeReport) -> String {
     let first = of_first_frame(report, "score");
     let after = report.frames.first().map_or(&report.certificate, |frame| &frame.certificate);
     // Pairs as the certificate counts them.
     let row = |score: &Score, certificate: &Certificate, state: &str, index: usize| {
         let (garment, pairs) = (&score.garments[index], &certificate.garments[index]);
-        let mut row = row![first => garment.name, "state" => state];
-        row.extend(TERMS.map(|(term, heading)| (heading.to_owned(), garment.raw.get(term).text())));
-        row.extend(row! {
+        let contact = row! {
             "inside, nearest vertex [%]" => 100.0 * garment.penetration.vertices_inside,
             "depth, nearest vertex [mm]" => garment.penetration.max_depth_mm,
             "body pairs" => pairs.body_triangle_pairs,
             "layer pairs" => pairs.layer_triangle_pairs,
             "self pairs" => pairs.self_triangle_pairs,
-        });
-        row
+        };
+        let name = row![first => garment.name, "state" => state];
+        [name, term_cells(&garment.raw, true), contact].concat()
     };
     let both = |i| {
         [row(&report.before, &report.certificate_before, "before", i), row(&report.after, after, "after", i)]
@@ -82,7 +74,7 @@ fn scores(report: &Report) -> String {
     table(&(0..report.garments.len()).flat_map(both).collect::<Vec<_>>())
 }
 
-fn layers(report: &Report) -> String {
+fn layers(report: &DrapeReport) -> String {
     let first = of_first_frame(report, "layers");
     let after = report.frames.first().map_or(&report.certificate, |frame| &frame.certificate);
     let name = |i: usize| &report.garments[i].name;
@@ -98,7 +90,7 @@ fn layers(report: &Report) -> String {
     table(&rows.collect::<Vec<_>>())
 }
 
-fn certificate(report: &Report) -> String {
+fn certificate(report: &DrapeReport) -> String {
     let found = &report.certificate;
     let of_all = match report.frames.len() {
         0 | 1 => String::new(),
@@ -119,8 +111,8 @@ fn certificate(report: &Report) -> String {
         let percent = (1e3 * strain).round() / 10.0 + 0.0;
         text += &format!(", strain {percent:+.1} %{worst}");
     }
-    if let Some(stopped) = stopped(found) {
-        text += &format!("\n{stopped}");
+    if let Some(left) = left_over(found.between(), found.is_stopped) {
+        text += &format!("\n{left}");
     }
     let pinched = found.pinched.count();
     if pinched > 0 {

@@ -1,11 +1,10 @@
 //! What a run begins with, checked before anything is made: nothing, a trained model, or a checkpoint of its own.
 
-use super::Arguments;
 use crate::cli::data_check::check_data;
 use crate::cli::loading::load_dataset_for;
 use crate::config::Config;
 use crate::dataset::{DataCheck, Dataset};
-use crate::run::checkpoint::{Checkpoint, CheckpointError, CheckpointState, TrainedModel};
+use crate::run::checkpoint::{Checkpoint, CheckpointError, TrainedModel};
 use crate::run::difference::AllowedChanges;
 use crate::run::folder::{RunDir, RunDirError};
 use crate::training::process_group::ProcessGroup;
@@ -17,38 +16,32 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 /// What a run begins with.
-pub(super) enum Origin {
+pub(super) enum RunOrigin {
     /// A new run, from a model or from nothing.
     New(Option<Box<TrainedModel>>),
     /// A run that goes on, from a checkpoint or, killed before its first, from the start.
     Resumed(RunDir, Option<Box<Checkpoint>>),
 }
 
-/// The data of a run.
-pub(super) struct Loaded {
-    pub dataset: Arc<Dataset>,
-    /// What its files look like; `None` where they are those of the checkpoint.
-    pub check: Option<DataCheck>,
-}
-
-impl Origin {
-    /// What the run in `root` begins with.
+impl RunOrigin {
+    /// What the run in `root` begins with. `resume` goes on with it, from the checkpoint there if one is named; the values of the
+    /// keys `allowed` may differ then.
     ///
     /// # Errors
     /// When the folder, the model or the checkpoint cannot be used. Only the lock of an existing run has been touched then.
     pub fn find(
-        arguments: &Arguments,
+        resume: Option<Option<&Path>>,
+        allowed: &[String],
         root: &Path,
         config: &Config,
         group: &ProcessGroup,
     ) -> Result<Self, Report> {
-        let Some(path) = &arguments.resume else {
+        let Some(path) = resume else {
             if group.is_rank_zero() {
                 RunDir::check_free(root)?;
             }
             return Ok(Self::New(start_model(config)?.map(Box::new)));
         };
-        let allowed = &arguments.allow_config_change;
         let run = match group.is_rank_zero() {
             true => RunDir::resume(root, config, allowed)?,
             false => {
@@ -56,7 +49,7 @@ impl Origin {
                 RunDir::follow(root).allowing(AllowedChanges::new(allowed, &[config]).map_err(unknown)?)
             }
         };
-        let checkpoint = newest_or_none(path.as_deref().unwrap_or(root))?;
+        let checkpoint = newest_or_none(path.unwrap_or(root))?;
         match &checkpoint {
             Some(checkpoint) => check_steps(root, checkpoint, config)?,
             None => drop(start_model(config)?),
@@ -66,28 +59,34 @@ impl Origin {
 
     /// Names of the joints that the networks see, where they are given.
     fn joints(&self) -> Option<&[String]> {
-        let of = |state: &CheckpointState| state.joints.len();
-        match self {
-            Self::New(Some(model)) if of(&model.state) > 0 => Some(&model.state.joints),
-            Self::Resumed(_, Some(checkpoint)) if of(&checkpoint.state) > 0 => Some(&checkpoint.state.joints),
-            _ => None,
-        }
+        let state = match self {
+            Self::New(Some(model)) => &model.state,
+            Self::Resumed(_, Some(checkpoint)) => &checkpoint.state,
+            _ => return None,
+        };
+        (!state.joints.is_empty()).then_some(&state.joints)
     }
 
-    /// Checks and loads the data of `config`. Data that a checkpoint was made with was checked when its run began.
+    /// Loads the data of `config`, and says what its files look like: nothing where they are those of the checkpoint, which were
+    /// checked when its run began.
     ///
     /// # Errors
     /// When it cannot be read or trained on; each garment, clip or body at fault is named.
-    pub fn load_data(&self, config: &Config, group: &ProcessGroup) -> Result<Loaded, Report> {
+    pub fn load_data(
+        &self,
+        config: &Config,
+        group: &ProcessGroup,
+    ) -> Result<(Arc<Dataset>, Option<DataCheck>), Report> {
         // One process tells; the others fail with it.
         let check = || group.is_rank_zero().then(|| check_data(config)).transpose();
         let Self::Resumed(_, Some(checkpoint)) = self else {
             let check = check()?;
-            return Ok(Loaded { dataset: load_dataset_for(config, self.joints())?, check });
+            return Ok((load_dataset_for(config, self.joints())?, check));
         };
         let dataset = load_dataset_for(config, self.joints())?;
         let is_same = checkpoint.state.data.as_deref() == Some(dataset.fingerprint());
-        Ok(Loaded { check: if is_same { None } else { check()? }, dataset })
+        let check = if is_same { None } else { check()? };
+        Ok((dataset, check))
     }
 
     /// Makes the session and, when nothing can be wrong any more, the folder of a new run.

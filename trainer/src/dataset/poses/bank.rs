@@ -1,9 +1,10 @@
 //! A bank of training poses, made once: recorded ones, recombined limbs, and uniform ones within the joint limits.
 
-use super::{PoseLibrary, Source};
+use super::draw::PoseDraw;
 use crate::config::{Config, PoseBankConfig};
-use clothcombo_data::asset::{Body, Pose};
-use clothcombo_data::cache::{ArrayCache, Key, KeyBuilder, body_key, get_poses, put_poses};
+use crate::dataset::body::with_body;
+use clothcombo_data::asset::Pose;
+use clothcombo_data::cache::{ArrayCache, Key, KeyBuilder, get_poses, put_poses};
 use clothcombo_data::check::is_possible;
 use clothcombo_data::generate::{LimbDensity, uniform_pose};
 use rand::SeedableRng;
@@ -18,7 +19,7 @@ use std::time::Instant;
 pub type BankProgress<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 /// Poses drawn before the least self-intersecting one is taken as it is.
-const ATTEMPTS: usize = 64;
+const BANK_ATTEMPTS: usize = 64;
 
 /// The bank of a library: how it is made, and what it holds once it is.
 pub(super) struct Bank {
@@ -31,7 +32,7 @@ pub(super) struct Bank {
 
 /// Where a pose of the bank comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Origin {
+enum PoseOrigin {
     Recorded,
     Recombined,
     Uniform,
@@ -49,20 +50,20 @@ impl Bank {
         })
     }
 
-    fn origin(&self, index: usize) -> Origin {
+    fn origin(&self, index: usize) -> PoseOrigin {
         let PoseBankConfig { size, recorded, recombined, .. } = self.config;
         let share = (index as f64 + 0.5) / size as f64;
         match share {
-            share if share < recorded => Origin::Recorded,
-            share if share < recorded + recombined => Origin::Recombined,
-            _ => Origin::Uniform,
+            share if share < recorded => PoseOrigin::Recorded,
+            share if share < recorded + recombined => PoseOrigin::Recombined,
+            _ => PoseOrigin::Uniform,
         }
     }
 
-    /// The poses: from the cache, or made for `library` and stored there.
-    pub fn poses(&self, library: &PoseLibrary, progress: BankProgress<'_>) -> &[Pose] {
+    /// The poses: from the cache, or made from `draw` and stored there.
+    pub fn poses(&self, draw: &PoseDraw, progress: BankProgress<'_>) -> &[Pose] {
         self.poses.get_or_init(|| {
-            let key = self.key(library);
+            let key = self.key(draw);
             let cache = self.cache.as_ref().and_then(|(folder, limit)| {
                 ArrayCache::open(folder, *limit)
                     .map_err(|e| tracing::warn!("{e}; going on without a cache"))
@@ -70,7 +71,7 @@ impl Bank {
             });
             let stored = cache.as_ref().and_then(|cache| get_poses(cache, key));
             stored.filter(|poses| poses.len() == self.config.size).unwrap_or_else(|| {
-                let poses = self.make(library, progress);
+                let poses = self.make(draw, progress);
                 if let Some(Err(e)) = cache.as_ref().map(|cache| put_poses(cache, key, &poses)) {
                     tracing::warn!("{e}; the poses are made again at the next start");
                 }
@@ -80,48 +81,44 @@ impl Bank {
     }
 
     /// Everything the poses are made from.
-    fn key(&self, library: &PoseLibrary) -> Key {
+    fn key(&self, draw: &PoseDraw) -> Key {
         let PoseBankConfig { size, recorded, recombined, uniform } = self.config;
-        let limit = library.filter.as_ref().map_or(f64::INFINITY, |filter| filter.limit);
+        let limit = draw.filter.as_ref().map_or(f64::INFINITY, |filter| filter.limit);
         // The number changes with how a bank is made.
         let mut key = KeyBuilder::new("pose bank 1")
             .number(self.seed)
             .number(size as u64)
             .array(&[recorded, recombined, uniform, limit])
-            .number(u64::from(library.augmentation.is_some()))
-            .number(u64::from(library.remove_heading));
-        if let Some(filter) = &library.filter {
-            let body: &Body = &filter.body;
-            key = key
-                .key(body_key(body))
-                .array(body.joint_template.as_flattened())
-                .array(body.pose_directions.as_deref().unwrap_or_default());
+            .number(u64::from(draw.augmentation.is_some()))
+            .number(u64::from(draw.remove_heading));
+        if let Some(filter) = &draw.filter {
+            key = with_body(key, &filter.body);
         }
-        for (pose, weight) in library.weighted_frames() {
+        for (pose, weight) in draw.weighted_frames() {
             key = key.array(&[weight]).array(pose.rotations.as_flattened());
         }
         key.finish()
     }
 
     /// Makes all poses; each has a random stream of its own.
-    fn make(&self, library: &PoseLibrary, progress: BankProgress<'_>) -> Vec<Pose> {
+    fn make(&self, draw: &PoseDraw, progress: BankProgress<'_>) -> Vec<Pose> {
         let start = Instant::now();
         // What no joint does is a fault of the recording, and no limb to recombine.
-        let frames = library.weighted_frames().filter(|(pose, _)| is_possible(pose));
+        let frames = draw.weighted_frames().filter(|(pose, _)| is_possible(pose));
         let density = LimbDensity::new(frames);
         let (done, drawn) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let make = |index: usize| {
             let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
             rng.set_stream(index as u64);
-            let mut draw = || {
+            let mut one = || {
                 drawn.fetch_add(1, Ordering::Relaxed);
                 match (self.origin(index), &density) {
-                    (Origin::Uniform, _) => uniform_pose(&mut rng),
-                    (Origin::Recombined, Some(density)) => library.facing_forward(&density.sample(&mut rng)),
-                    _ => library.draw_unfiltered(1.0, &mut rng),
+                    (PoseOrigin::Uniform, _) => uniform_pose(&mut rng),
+                    (PoseOrigin::Recombined, Some(density)) => draw.facing_forward(&density.sample(&mut rng)),
+                    _ => draw.unfiltered(1.0, &mut rng),
                 }
             };
-            let pose = library.least_intersecting(ATTEMPTS, is_possible, &mut draw);
+            let pose = draw.least_intersecting(BANK_ATTEMPTS, is_possible, &mut one);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, self.config.size);
             pose
         };
@@ -136,37 +133,9 @@ impl Bank {
     }
 }
 
-impl PoseLibrary {
-    /// The same with the bank of poses that `config` asks for, if any; it is made when it is first needed.
-    #[must_use]
-    pub fn with_bank(self, config: &Config) -> Self {
-        Self { bank: Bank::new(config), ..self }
-    }
-
-    /// Makes the bank of training poses, or reads it from the cache; nothing without one.
-    pub fn make_bank(&self, progress: BankProgress<'_>) {
-        if let Some(bank) = &self.bank {
-            bank.poses(self, progress);
-        }
-    }
-
-    /// Whether training poses come from a bank.
-    pub fn has_bank(&self) -> bool {
-        self.bank.is_some()
-    }
-
-    /// The recorded poses that are trained on, and how likely each is drawn.
-    fn weighted_frames(&self) -> impl Iterator<Item = (&Pose, f64)> {
-        let frames = match &self.source {
-            Source::Frames(frames) => Some(frames.weighted()),
-            Source::Sampler(_) => None,
-        };
-        frames.into_iter().flatten()
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::PoseLibrary;
     use super::*;
     use crate::config::parse;
     use crate::dataset::HeldOut;
@@ -195,7 +164,7 @@ mod tests {
     const SMALL: &str = "{ size = 20, recorded = 0.5, recombined = 0.3, uniform = 0.2 }";
 
     fn poses(library: &PoseLibrary) -> &[Pose] {
-        library.bank.as_ref().unwrap().poses(library, &|_, _| ())
+        library.bank.as_ref().unwrap().poses(&library.draw, &|_, _| ())
     }
 
     #[test]
@@ -214,13 +183,16 @@ mod tests {
         }
         let bank = first.bank.as_ref().unwrap();
         let count = |origin| (0..20).filter(|i| bank.origin(*i) == origin).count();
-        assert_eq!([Origin::Recorded, Origin::Recombined, Origin::Uniform].map(count), [10, 6, 4]);
+        assert_eq!(
+            [PoseOrigin::Recorded, PoseOrigin::Recombined, PoseOrigin::Uniform].map(count),
+            [10, 6, 4]
+        );
 
         // Read again, to the bit; another seed or mixture makes another.
         let again = library(folder.path(), SMALL, 1);
         again.make_bank(&|_, _| panic!("made again"));
         assert_eq!(poses(&again), poses(&first));
-        let key = |library: &PoseLibrary| library.bank.as_ref().unwrap().key(library);
+        let key = |library: &PoseLibrary| library.bank.as_ref().unwrap().key(&library.draw);
         let shares = SMALL.replace("recorded = 0.5, recombined = 0.3", "recorded = 0.4, recombined = 0.4");
         for other in [library(folder.path(), SMALL, 2), library(folder.path(), &shares, 1)] {
             assert_ne!(key(&other), key(&first));

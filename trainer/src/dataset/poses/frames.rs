@@ -1,16 +1,27 @@
 //! Frames of motion clips, by what they are for.
 
-use super::HeldOut;
 use super::hold_out::{HeldOutFrames, Purpose, hold_out, remedy, runs_of};
 use crate::config::PoseConfig;
 use crate::dataset::DatasetError;
 use clothcombo_data::asset::{Motion, Pose, Provenance};
 use rand::RngExt;
 use rand::distr::Distribution;
-use rand::distr::weighted::{self, WeightedIndex};
+use rand::distr::weighted::WeightedIndex;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use std::path::Path;
+
+/// Poses never trained on, by what reads them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HeldOut {
+    /// Windows of the trained clips, which every validation of a run scores; sampled poses where there are no clips.
+    Windows,
+    /// Clips that every validation of a run scores.
+    ValidationClips,
+    /// Clips that no run reads.
+    TestClips,
+}
 
 /// Motion clips by what they are for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -58,24 +69,30 @@ fn check_names(clips: &[Motion], config: &PoseConfig, folder: &Path) -> Result<(
             config.optional_clips.contains(name) || clips.iter().any(|clip| clip.name.contains(name.as_str()))
         };
         if let Some(name) = names.iter().find(|name| !fits(name)) {
-            return Err(DatasetError::UnknownClip {
-                key,
-                folder: folder.to_owned(),
-                name: name.clone(),
-                clips: clips.iter().map(|clip| clip.name.as_str()).collect::<Vec<_>>().join(", "),
-            });
+            let clips = clips.iter().map(|clip| clip.name.as_str()).collect::<Vec<_>>().join(", ");
+            return Err(DatasetError::new(
+                format!("data.poses.{key} names {name:?}, which fits no clip in {}", folder.display()),
+                format!(
+                    "a name that may fit none belongs in data.poses.optional_clips as well; the clips are: {clips}"
+                ),
+            ));
         }
     }
     let in_both = |clip: &&Motion| sets.iter().all(|(_, names)| is_named(&clip.name, names));
     match clips.iter().find(in_both) {
         None => Ok(()),
-        Some(clip) => Err(DatasetError::ClipOfTwoSets { clip: clip.name.clone() }),
+        Some(Motion { name, .. }) => Err(DatasetError::new(
+            format!("clip {name} is named by data.poses.validation_clips and by data.poses.test_clips"),
+            "a clip is for one of them; a name stands for every clip whose name contains it",
+        )),
     }
 }
 
 /// Frames by what they are for.
 pub(super) struct Frames {
-    training: Training,
+    /// Clips that are trained on, none of them empty.
+    trained_on: Vec<TrainedClip>,
+    shares: WeightedIndex<f64>,
     /// Frames of the windows held out of the trained clips.
     pub windows: Vec<Pose>,
     /// Frames of the validation clips.
@@ -112,10 +129,15 @@ impl Frames {
             }
         }
         if own.iter().all(|clip| clip.poses.is_empty()) {
-            return Err(DatasetError::NoTrainedClip {
-                folder: folder.to_owned(),
-                named: clips.len() - own.len(),
-            });
+            return Err(DatasetError::new(
+                format!(
+                    "{}: no clip to train on: {} are named by data.poses.validation_clips or test_clips, the others have no \
+                     frames",
+                    folder.display(),
+                    clips.len() - own.len()
+                ),
+                "name fewer clips there, or add some: a run needs frames to train on beside those that it validates on",
+            ));
         }
         let HeldOutFrames { purposes, note } = hold_out(&own, config);
         if let Some(note) = note {
@@ -134,21 +156,25 @@ impl Frames {
             }
             if !poses.is_empty() {
                 let seconds = poses.len() as f64 / clip.frame_rate;
-                train.push(Clip { poses, seconds });
+                train.push(TrainedClip { poses, seconds });
             }
         }
         if train.is_empty() || windows.is_empty() {
-            let count = |clip: &Clip| clip.poses.len();
-            return Err(DatasetError::EmptySplit {
-                folder: folder.to_owned(),
-                train: train.iter().map(count).sum(),
-                held_out: windows.len(),
-                remedy: remedy(&own, config),
-            });
+            let trained: usize = train.iter().map(|clip: &TrainedClip| clip.poses.len()).sum();
+            return Err(DatasetError::new(
+                format!(
+                    "{}: {trained} frames to train on and {} held out to validate on; the clips are too few or too short to \
+                     hold a part out of them",
+                    folder.display(),
+                    windows.len()
+                ),
+                remedy(&own, config),
+            ));
         }
-        let training = Training::new(train).map_err(|_| frame_rates(folder, clips))?;
+        let shares = WeightedIndex::new(train.iter().map(TrainedClip::share));
+        let shares = shares.map_err(|_| frame_rates(folder, clips))?;
         let sources = clips.iter().map(|clip| clip.source.clone()).collect();
-        Ok(Self { training, windows, validation, test, clips: names, sources })
+        Ok(Self { trained_on: train, shares, windows, validation, test, clips: names, sources })
     }
 
     /// The frames of one kind of held-out poses.
@@ -167,13 +193,13 @@ impl Frames {
 
     /// The frames trained on, clip by clip.
     pub fn trained_clips(&self) -> impl Iterator<Item = &[Pose]> {
-        self.training.clips.iter().map(|clip| clip.poses.as_slice())
+        self.trained_on.iter().map(|clip| clip.poses.as_slice())
     }
 
     /// The frames trained on, each with how likely [`sample_training`](Self::sample_training) is to draw it, relative to the
     /// others.
     pub fn weighted(&self) -> impl Iterator<Item = (&Pose, f64)> {
-        self.training.clips.iter().flat_map(|clip| {
+        self.trained_on.iter().flat_map(|clip| {
             let weight = clip.share() / clip.poses.len() as f64;
             clip.poses.iter().map(move |pose| (pose, weight))
         })
@@ -181,49 +207,36 @@ impl Frames {
 
     /// A frame to train on.
     pub fn sample_training(&self, rng: &mut ChaCha8Rng) -> &Pose {
-        self.training.draw(rng)
+        let poses = &self.trained_on[self.shares.sample(rng)].poses;
+        &poses[rng.random_range(0..poses.len())]
     }
 }
 
 /// The frame rates between which the lengths of the clips in `folder` cannot be compared.
 fn frame_rates(folder: &Path, clips: &[Motion]) -> DatasetError {
     let rates = || clips.iter().map(|clip| clip.frame_rate);
-    DatasetError::FrameRates {
-        folder: folder.to_owned(),
-        lowest: rates().fold(f64::INFINITY, f64::min),
-        highest: rates().fold(f64::NEG_INFINITY, f64::max),
-    }
+    let (lowest, highest) =
+        (rates().fold(f64::INFINITY, f64::min), rates().fold(f64::NEG_INFINITY, f64::max));
+    DatasetError::new(
+        format!(
+            "{}: at frame rates from {lowest:?} to {highest:?} a second the clips' lengths in time cannot be compared",
+            folder.display()
+        ),
+        "`clothcombo check` tells the frame rate of every motion; set mocap_framerate, for example to 30",
+    )
 }
 
 /// What is trained on of a clip.
-struct Clip {
+struct TrainedClip {
     poses: Vec<Pose>,
     seconds: f64,
 }
 
-impl Clip {
+impl TrainedClip {
     /// Its share grows with the square root of its length in time: neighbouring frames are alike, so that by frames alone a long
     /// clip, or one of a high frame rate, would crowd out the others.
     fn share(&self) -> f64 {
         self.seconds.sqrt()
-    }
-}
-
-/// Clips that are trained on, none of them empty.
-struct Training {
-    clips: Vec<Clip>,
-    shares: WeightedIndex<f64>,
-}
-
-impl Training {
-    fn new(clips: Vec<Clip>) -> Result<Self, weighted::Error> {
-        let shares = WeightedIndex::new(clips.iter().map(Clip::share))?;
-        Ok(Self { clips, shares })
-    }
-
-    fn draw(&self, rng: &mut ChaCha8Rng) -> &Pose {
-        let poses = &self.clips[self.shares.sample(rng)].poses;
-        &poses[rng.random_range(0..poses.len())]
     }
 }
 

@@ -14,9 +14,9 @@ pub(super) enum Purpose {
 }
 
 /// Windows that hold out less than this part of `held_out_share` are too few to validate on; whole clips join them.
-const ENOUGH: f64 = 0.25;
+const ENOUGH_IN_WINDOWS: f64 = 0.25;
 /// Whole clips are held out of at most this part of the time of all.
-const MOST: f64 = 1.0 / 3.0;
+const MOST_WHOLE: f64 = 1.0 / 3.0;
 /// The shortest window that a short clip is given (s).
 const SHORTEST_WINDOW: f64 = 0.1;
 
@@ -60,10 +60,10 @@ pub(super) fn hold_out(clips: &[&Motion], config: &PoseConfig) -> HeldOutFrames 
     let total: f64 = seconds.iter().sum();
     let wanted = total / config.blocks_per_window() as f64;
     let in_windows = held_out(&purposes);
-    if in_windows.is_nan() || in_windows >= ENOUGH * wanted {
+    if in_windows.is_nan() || in_windows >= ENOUGH_IN_WINDOWS * wanted {
         return HeldOutFrames { purposes, note: None };
     }
-    let whole = whole_clips(clips, &seconds, &purposes, in_windows, wanted, MOST * total);
+    let whole = whole_clips(clips, &seconds, &purposes, in_windows, wanted, MOST_WHOLE * total);
     for clip in &whole {
         purposes[*clip].fill(Purpose::HeldOut);
     }
@@ -96,11 +96,6 @@ pub(super) fn hold_out(clips: &[&Motion], config: &PoseConfig) -> HeldOutFrames 
         )
     });
     HeldOutFrames { purposes, note }
-}
-
-/// Seconds of the shortest clip that can have a window by itself.
-pub(super) fn shortest_clip(config: &PoseConfig) -> f64 {
-    SHORTEST_WINDOW * config.blocks_per_window() as f64
 }
 
 /// The clips without a window that are held out whole, so that `wanted` seconds are held out together with those `in_windows`.
@@ -161,7 +156,7 @@ fn in_blocks(clip: &Motion, block: f64, margin: f64, config: &PoseConfig) -> Vec
 pub(super) fn remedy(clips: &[&Motion], config: &PoseConfig) -> String {
     let more = format!(
         "add clips: one of {:.1} s is split, and of several, one that is at most a third of the time of all is held out whole",
-        shortest_clip(config)
+        SHORTEST_WINDOW * config.blocks_per_window() as f64
     );
     let longest = clips.iter().max_by_key(|clip| clip.poses.len());
     let Some(clip) = longest.filter(|clip| clip.poses.len() > 1) else { return more };

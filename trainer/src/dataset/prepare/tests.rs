@@ -1,9 +1,11 @@
 use super::*;
+use crate::config::parse;
 use crate::dataset::Preprocessor;
-use clothcombo_data::asset::{Binding, BindingSettings, Category, Garment, Pose};
+use clothcombo_data::asset::{Binding, Category, Garment, Pose};
 use clothcombo_data::generate::mannequin;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::mesh::shapes::grid;
+use std::path::Path;
 
 /// A patch of cloth whose lowest corner has the height `low` (m).
 fn patch(preprocessor: &Preprocessor, joints: &ActiveJoints, low: f64) -> Arc<PreparedGarment> {
@@ -20,13 +22,9 @@ fn patch(preprocessor: &Preprocessor, joints: &ActiveJoints, low: f64) -> Arc<Pr
 fn distant_garments_are_a_pair_in_the_full_graph_only() {
     let losses = LossesConfig::default();
     let body = Arc::new(mannequin());
-    let preprocessor = Preprocessor {
-        body: body.clone(),
-        binding: BindingSettings::default(),
-        energy: losses.energy_settings(),
-        eigen_count: 4,
-        cache: None,
-    };
+    let text = "[[data.garments]]\ngenerate = { count = 2 }\n[[stages]]\nname = \"single\"\ntrains = \"single\"\nsteps = 1\n";
+    let config = parse(text, Path::new("patches.toml"), &[]).unwrap();
+    let preprocessor = Preprocessor::new(&config, body.clone());
     let joints = ActiveJoints::named(&body, &body.joint_names).unwrap();
     // The second one begins 4 cm above the first; the third is 25 cm above that.
     let garments = [0.0, 0.24, 0.69].map(|low| patch(&preprocessor, &joints, low)).to_vec();

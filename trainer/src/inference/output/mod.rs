@@ -12,168 +12,63 @@
 //! ```
 
 mod picture;
+mod show;
 mod staged;
 mod viewer;
 
+pub use show::Show;
 pub use staged::Staged;
 
-use super::{Bodies, Drape, Draper, DraperError, GivenGarment, Outfit, Report, Smoothing};
-use crate::picture::{BODY_COLOUR, PictureError, layer_colour};
+use super::drape::Drape;
+use super::report::DrapeReport;
+use super::source::GivenGarment;
+use crate::picture::{BODY_COLOUR, layer_colour, save_png};
 use clothcombo_data::format::obj::{self, MovedObj};
 use clothcombo_data::format::{FileError, PointFrames, SceneMesh, save_glb};
-use miette::Diagnostic;
-use std::path::{Path, PathBuf};
-use std::time::Instant;
-use thiserror::Error;
-
-/// Why a drape cannot be written.
-#[derive(Debug, Error, Diagnostic)]
-pub enum OutputError {
-    /// Something else is there.
-    #[error("{} is there and is not empty", path.display())]
-    #[diagnostic(help("choose another folder, or pass --replace if it holds earlier results"))]
-    Occupied {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// A file is where a folder is wanted.
-    #[error("{} is a file, not a folder", file.display())]
-    #[diagnostic(help("-o names the folder to be made: choose another name"))]
-    Obstacle {
-        /// The file.
-        file: PathBuf,
-    },
-    /// Something else is among what is to be replaced.
-    #[error("{} holds {file}, which was not written with the rest", path.display())]
-    #[diagnostic(help("--replace removes the whole folder: move the file away, or choose another folder"))]
-    Foreign {
-        /// The folder.
-        path: PathBuf,
-        /// The file, relative to the folder.
-        file: String,
-    },
-    /// What is to be replaced was not written here, or by an early version.
-    #[error("{} is there and was not written by this program", path.display())]
-    #[diagnostic(help(
-        "--replace only takes folders that drape or resolve has written; choose another folder"
-    ))]
-    NotOurs {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// What is to be replaced is being read.
-    #[error("{} would be replaced, and {} in it is read", path.display(), input.display())]
-    #[diagnostic(help("choose another folder for the output"))]
-    Input {
-        /// The folder.
-        path: PathBuf,
-        /// The input.
-        input: PathBuf,
-    },
-    /// Something has come there since the start.
-    #[error("while this ran, something else came: {reason}; the result is in {}", instead.display())]
-    Meanwhile {
-        /// What obstructs it.
-        reason: Box<OutputError>,
-        /// The folder that was made.
-        instead: PathBuf,
-    },
-    /// The path names no folder that could be made.
-    #[error("{} names no new folder", path.display())]
-    #[diagnostic(help("give the folder to be made a name, for example -o {}", path.join("drape").display()))]
-    NoName {
-        /// The path.
-        path: PathBuf,
-    },
-    /// The file system refused.
-    #[error("cannot write {}: {reason}", path.display())]
-    #[diagnostic(help(
-        "check that the folder is writable and the disk is not full; nothing was left behind"
-    ))]
-    Io {
-        /// File or folder.
-        path: PathBuf,
-        /// The system's reason.
-        reason: std::io::Error,
-    },
-    /// An OBJ or the GLB file.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// The picture.
-    #[error(transparent)]
-    Picture(#[from] PictureError),
-    /// A state that cannot be measured.
-    #[error(transparent)]
-    #[diagnostic(transparent)]
-    Draper(#[from] DraperError),
-}
-
-/// What is to be shown and written.
-#[derive(Clone, Copy)]
-pub struct Show<'a> {
-    /// What draped it.
-    pub draper: &'a Draper,
-    /// The garments.
-    pub outfit: &'a Outfit,
-    /// What it was draped on.
-    pub bodies: &'a Bodies,
-    /// One drape, or the frames of a motion.
-    pub drapes: &'a [Drape],
-    /// What temporal smoothing did to them.
-    pub smoothing: Option<&'a Smoothing>,
-    /// Headline of picture and viewer.
-    pub title: &'a str,
-    /// Whether every frame of a motion gets its OBJ files, not only the first.
-    pub all_frames: bool,
-}
+use miette::{IntoDiagnostic, Report};
+use rayon::prelude::*;
+use staged::cannot_write;
+use std::path::Path;
 
 /// Writes everything into `folder`, which is made if it is not there.
 ///
 /// # Errors
 /// When a file cannot be written, or a state cannot be measured.
-pub fn write(folder: &Path, show: &Show) -> Result<Report, OutputError> {
-    let refused = |reason| OutputError::Io { path: folder.into(), reason };
-    std::fs::create_dir_all(folder).map_err(refused)?;
+pub fn write(folder: &Path, show: &Show) -> Result<DrapeReport, Report> {
+    std::fs::create_dir_all(folder).map_err(|e| cannot_write(folder, &e))?;
     let (written, report) = rayon::join(
         || write_files(folder, show),
-        || Report::new(show.draper, show.outfit, show.drapes, show.bodies, show.smoothing.cloned()),
+        || DrapeReport::new(show.draper, show.outfit, show.drapes, show.bodies, show.smoothing.cloned()),
     );
     let report = report?;
-    for (file, milliseconds) in written? {
-        tracing::debug!("{file} in {milliseconds:.0} ms");
-    }
-    let json = serde_json::to_vec_pretty(&report).map_err(|e| refused(e.into()))?;
-    std::fs::write(folder.join("report.json"), json).map_err(refused)?;
+    written?;
+    let json = serde_json::to_vec_pretty(&report).into_diagnostic()?;
+    std::fs::write(folder.join("report.json"), json).map_err(|e| cannot_write(folder, &e))?;
     Ok(report)
 }
 
-/// Writes everything but the report into `folder`; returns the time of each kind of file (ms).
-fn write_files(folder: &Path, show: &Show) -> Result<[(&'static str, f64); 5], OutputError> {
-    fn timed<T>(run: impl FnOnce() -> Result<T, OutputError>) -> Result<f64, OutputError> {
-        let clock = Instant::now();
-        run().map(|_| 1e3 * clock.elapsed().as_secs_f64())
+/// Writes everything but the report into `folder`.
+fn write_files(folder: &Path, show: &Show) -> Result<(), Report> {
+    let files: [&(dyn Fn() -> Result<(), Report> + Sync); 5] = [
+        &|| write_meshes(folder, show),
+        &|| write_caches(folder, show).into_diagnostic(),
+        &|| write_scene(&folder.join("scene.glb"), show).into_diagnostic(),
+        &|| write_pictures(folder, show),
+        &|| viewer::save(&folder.join("viewer.html"), show),
+    ];
+    files.par_iter().with_max_len(1).try_for_each(|write| write())
+}
+
+fn write_pictures(folder: &Path, show: &Show) -> Result<(), Report> {
+    save_png(&picture::draw(show), &folder.join("picture.png")).into_diagnostic()?;
+    match show.outfit.garments.len() {
+        1 => Ok(()),
+        _ => save_png(&picture::draw_layers(show), &folder.join("layers.png")).into_diagnostic(),
     }
-    let meshes = || timed(|| write_meshes(folder, show));
-    let caches = || timed(|| write_caches(folder, show));
-    let scene = || timed(|| write_scene(&folder.join("scene.glb"), show));
-    let picture = || {
-        timed(|| {
-            crate::picture::save_png(&picture::draw(show), &folder.join("picture.png"))?;
-            if show.outfit.garments.len() > 1 {
-                crate::picture::save_png(&picture::draw_layers(show), &folder.join("layers.png"))?;
-            }
-            Ok(())
-        })
-    };
-    let page = || timed(|| viewer::save(&folder.join("viewer.html"), show));
-    let ((meshes, (scene, caches)), (picture, page)) =
-        rayon::join(|| rayon::join(meshes, || rayon::join(scene, caches)), || rayon::join(picture, page));
-    let (caches, scene) = (caches?, scene?);
-    Ok([("obj", meshes?), ("glb", scene), ("caches", caches), ("picture", picture?), ("viewer", page?)])
 }
 
 /// The vertices of the OBJ files in every frame of a motion.
-fn write_caches(folder: &Path, show: &Show) -> Result<(), OutputError> {
+fn write_caches(folder: &Path, show: &Show) -> Result<(), FileError> {
     if show.bodies.moments.is_empty() {
         return Ok(());
     }
@@ -192,7 +87,7 @@ fn write_caches(folder: &Path, show: &Show) -> Result<(), OutputError> {
     Ok(())
 }
 
-fn write_meshes(folder: &Path, show: &Show) -> Result<(), OutputError> {
+fn write_meshes(folder: &Path, show: &Show) -> Result<(), Report> {
     for loss in write_frame(folder, show, &show.drapes[0])? {
         tracing::warn!("{loss}");
     }
@@ -205,10 +100,11 @@ fn write_meshes(folder: &Path, show: &Show) -> Result<(), OutputError> {
 }
 
 /// Returns what of the given files is lost, if anything: in every frame the same.
-fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<Vec<String>, OutputError> {
+fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<Vec<String>, Report> {
     let mut lost = Vec::new();
     let body = show.draper.body();
-    obj::save(&folder.join("body.obj"), &drape.body, &body.faces, &[format!("body {}", body.name)])?;
+    let comments = [format!("body {}", body.name)];
+    obj::save(&folder.join("body.obj"), &drape.body, &body.faces, &comments).into_diagnostic()?;
     for (layer, (garment, draped)) in show.outfit.garments.iter().zip(&drape.garments).enumerate() {
         let source = &garment.source;
         let mut comments =
@@ -231,10 +127,10 @@ fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<Vec<String>,
             None
         });
         match moved {
-            Some(moved) => {
-                moved.save(folder, &garment.name).map_err(|reason| OutputError::Io { path, reason })?
+            Some(moved) => moved.save(folder, &garment.name).map_err(|e| cannot_write(&path, &e))?,
+            None => {
+                obj::save_polygons(&path, &positions, source.given.polygons(), &comments).into_diagnostic()?
             }
-            None => obj::save_polygons(&path, &positions, source.given.polygons(), &comments)?,
         }
     }
     Ok(lost)
@@ -265,7 +161,7 @@ fn as_given(
     Ok(Some(MovedObj { obj: bytes, ..moved }))
 }
 
-fn write_scene(path: &Path, show: &Show) -> Result<(), OutputError> {
+fn write_scene(path: &Path, show: &Show) -> Result<(), FileError> {
     let mut meshes = vec![SceneMesh {
         name: "body",
         colour: BODY_COLOUR,
@@ -283,7 +179,7 @@ fn write_scene(path: &Path, show: &Show) -> Result<(), OutputError> {
         });
     }
     let times: Vec<f64> = show.bodies.moments.iter().map(|m| m.seconds).collect();
-    Ok(save_glb(path, &meshes, &times)?)
+    save_glb(path, &meshes, &times)
 }
 
 #[cfg(test)]

@@ -1,17 +1,17 @@
 //! The pictures of a drape: all garments, of a motion in some frames, one below the other; and each garment alone.
 
-use super::Show;
+use super::show::Show;
 use crate::picture::{DressedRow, draw_dressed};
 use image::RgbImage;
 
 /// Rows of a motion's picture.
-const ROWS: usize = 4;
+const PICTURE_ROWS: usize = 4;
 
 pub(super) fn draw(show: &Show) -> RgbImage {
     let count = show.drapes.len();
     let shown: Vec<usize> = match count {
-        0..=ROWS => (0..count).collect(),
-        _ => (0..ROWS).map(|row| row * (count - 1) / (ROWS - 1)).collect(),
+        0..=PICTURE_ROWS => (0..count).collect(),
+        _ => (0..PICTURE_ROWS).map(|row| row * (count - 1) / (PICTURE_ROWS - 1)).collect(),
     };
     let rows: Vec<DressedRow> = shown.into_iter().map(|frame| row(show, frame)).collect();
     let names: Vec<&str> = show.outfit.names().collect();

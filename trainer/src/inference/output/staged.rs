@@ -1,8 +1,8 @@
 //! A folder that appears whole or not at all.
 
-use super::OutputError;
 use crate::system::paths::obstacle;
 use clothcombo_data::format::atomic::Temporary;
+use miette::{Report, miette};
 use std::collections::HashSet;
 use std::fs;
 use std::hash::{BuildHasher, RandomState};
@@ -27,8 +27,17 @@ impl Staged {
     ///
     /// # Errors
     /// When something else is there, or the folder cannot be made.
-    pub fn new(target: &Path, replace: bool, inputs: &[PathBuf]) -> Result<Self, OutputError> {
-        let name = target.file_name().ok_or_else(|| OutputError::NoName { path: target.into() })?;
+    pub fn new(target: &Path, replace: bool, inputs: &[PathBuf]) -> Result<Self, Report> {
+        let name = target.file_name().ok_or_else(|| {
+            miette!(
+                help = format!(
+                    "give the folder to be made a name, for example -o {}",
+                    target.join("drape").display()
+                ),
+                "{} names no new folder",
+                target.display()
+            )
+        })?;
         // A link to a folder stays a link.
         let target = fs::canonicalize(target).unwrap_or_else(|_| target.to_owned());
         check_free(&target, replace, inputs)?;
@@ -36,8 +45,7 @@ impl Staged {
         let temporary = target.with_file_name(format!(".{}.{number:016x}.tmp", name.to_string_lossy()));
         let temporary = Temporary::new(temporary);
         let staged = Self { target, temporary, replace, inputs: inputs.to_vec() };
-        fs::create_dir_all(staged.folder())
-            .map_err(|reason| OutputError::Io { path: staged.folder().into(), reason })?;
+        fs::create_dir_all(staged.folder()).map_err(|e| cannot_write(staged.folder(), &e))?;
         Ok(staged)
     }
 
@@ -45,7 +53,7 @@ impl Staged {
     ///
     /// # Errors
     /// When one of `inputs` lies in the folder that is to be replaced.
-    pub fn keep(&mut self, inputs: impl IntoIterator<Item = PathBuf>) -> Result<(), OutputError> {
+    pub fn keep(&mut self, inputs: impl IntoIterator<Item = PathBuf>) -> Result<(), Report> {
         self.inputs.extend(inputs);
         check_free(&self.target, self.replace, &self.inputs)
     }
@@ -60,8 +68,8 @@ impl Staged {
     ///
     /// # Errors
     /// When it cannot be renamed, or not as was asked; what was there before is left as it was.
-    pub fn commit(self) -> Result<(), OutputError> {
-        let failed = |reason: io::Error| OutputError::Io { path: self.target.clone(), reason };
+    pub fn commit(self) -> Result<(), Report> {
+        let failed = |reason: io::Error| cannot_write(&self.target, &reason);
         let folder = self.folder();
         let list: String = files(folder).map_err(failed)?.iter().map(|f| format!("{f}\n")).collect();
         fs::write(folder.join(LIST), list).map_err(failed)?;
@@ -69,22 +77,42 @@ impl Staged {
             let instead = free_name(&self.target);
             fs::rename(folder, &instead).map_err(failed)?;
             self.temporary.keep();
-            return Err(OutputError::Meanwhile { reason: Box::new(reason), instead });
+            return Err(miette!(
+                "while this ran, something else came: {reason}; the result is in {}",
+                instead.display()
+            ));
         }
         self.temporary.replace(&self.target).map_err(failed)
     }
 }
 
 /// Whether there is nothing at `target`, or what may be replaced.
-fn check_free(target: &Path, replace: bool, inputs: &[PathBuf]) -> Result<(), OutputError> {
+fn check_free(target: &Path, replace: bool, inputs: &[PathBuf]) -> Result<(), Report> {
     if let Some(file) = obstacle(target) {
-        return Err(OutputError::Obstacle { file: file.into() });
+        return Err(miette!(
+            help = "-o names the folder to be made: choose another name",
+            "{} is a file, not a folder",
+            file.display()
+        ));
     }
     match fs::symlink_metadata(target).is_ok() && !is_empty_folder(target) {
         true if replace => check_own(target, inputs),
-        true => Err(OutputError::Occupied { path: target.into() }),
+        true => Err(miette!(
+            help = "choose another folder, or pass --replace if it holds earlier results",
+            "{} is there and is not empty",
+            target.display()
+        )),
         false => Ok(()),
     }
+}
+
+/// The file system refused.
+pub(super) fn cannot_write(path: &Path, reason: &io::Error) -> Report {
+    miette!(
+        help = "check that the folder is writable and the disk is not full; nothing was left behind",
+        "cannot write {}: {reason}",
+        path.display()
+    )
 }
 
 /// `target` with the first number that is not taken.
@@ -95,19 +123,31 @@ fn free_name(target: &Path) -> PathBuf {
 }
 
 /// Whether all of `folder` was written here, and none of it is read now.
-fn check_own(folder: &Path, inputs: &[PathBuf]) -> Result<(), OutputError> {
-    let path = folder.to_owned();
+fn check_own(folder: &Path, inputs: &[PathBuf]) -> Result<(), Report> {
     let Ok(list) = fs::read_to_string(folder.join(LIST)) else {
-        return Err(OutputError::NotOurs { path });
+        return Err(miette!(
+            help = "--replace only takes folders that drape or resolve has written; choose another folder",
+            "{} is there and was not written by this program",
+            folder.display()
+        ));
     };
     let own: HashSet<&str> = list.lines().chain([LIST]).collect();
-    let found = files(folder).map_err(|reason| OutputError::Io { path: path.clone(), reason })?;
+    let found = files(folder).map_err(|e| cannot_write(folder, &e))?;
     if let Some(file) = found.into_iter().find(|file| !own.contains(file.as_str())) {
-        return Err(OutputError::Foreign { path, file });
+        return Err(miette!(
+            help = "--replace removes the whole folder: move the file away, or choose another folder",
+            "{} holds {file}, which was not written with the rest",
+            folder.display()
+        ));
     }
     let is_inside = |input: &&PathBuf| fs::canonicalize(input).is_ok_and(|input| input.starts_with(folder));
     match inputs.iter().find(is_inside) {
-        Some(input) => Err(OutputError::Input { path, input: input.clone() }),
+        Some(input) => Err(miette!(
+            help = "choose another folder for the output",
+            "{} would be replaced, and {} in it is read",
+            folder.display(),
+            input.display()
+        )),
         None => Ok(()),
     }
 }
@@ -147,7 +187,11 @@ mod tests {
         names
     }
 
-    fn written(target: &Path, replace: bool, text: &str) -> Result<(), OutputError> {
+    fn refused<T>(result: Result<T, Report>) -> String {
+        result.err().expect("it is refused").to_string()
+    }
+
+    fn written(target: &Path, replace: bool, text: &str) -> Result<(), Report> {
         let staged = Staged::new(target, replace, &[])?;
         fs::create_dir_all(staged.folder().join("frames")).unwrap();
         fs::write(staged.folder().join("frames/a.obj"), text).unwrap();
@@ -166,7 +210,7 @@ mod tests {
         written(&target, false, "1").unwrap();
         assert_eq!(names(place.path()), ["out"]);
         assert_eq!(names(&target), [LIST, "frames"]);
-        assert!(matches!(Staged::new(Path::new("/"), false, &[]), Err(OutputError::NoName { .. })));
+        assert!(refused(Staged::new(Path::new("/"), false, &[])).contains("names no new folder"));
     }
 
     #[test]
@@ -189,10 +233,8 @@ mod tests {
         staged().commit().unwrap();
         assert_eq!(names(&place.path().join("a/b")), ["out"]);
         // A file obstructs it: what was made up to it is gone too.
-        assert!(matches!(
-            Staged::new(&place.path().join("a/note/c/out"), false, &[]),
-            Err(OutputError::Obstacle { .. })
-        ));
+        let obstructed = Staged::new(&place.path().join("a/note/c/out"), false, &[]);
+        assert!(refused(obstructed).contains("note is a file, not a folder"));
         assert_eq!(names(&place.path().join("a")), ["b", "note"]);
     }
 
@@ -203,8 +245,9 @@ mod tests {
         written(&target, false, "1").unwrap();
         let mut staged = Staged::new(&target, true, &[]).unwrap();
         staged.keep([place.path().join("elsewhere.obj")]).unwrap();
-        assert!(matches!(staged.keep([target.join("frames/a.obj")]), Err(OutputError::Input { .. })));
-        assert!(matches!(staged.keep([target.clone()]), Err(OutputError::Input { .. })));
+        for input in [target.join("frames/a.obj"), target.clone()] {
+            assert!(refused(staged.keep([input])).contains("in it is read"));
+        }
         drop(staged);
         assert_eq!(names(place.path()), ["out"]);
     }
@@ -215,21 +258,19 @@ mod tests {
         let target = place.path().join("out");
         fs::create_dir(&target).unwrap();
         written(&target, false, "1").unwrap();
-        assert!(matches!(written(&target, false, "2"), Err(OutputError::Occupied { .. })));
+        assert!(refused(written(&target, false, "2")).contains("not empty"));
         written(&target, true, "2").unwrap();
         let file = target.join("frames/a.obj");
         assert_eq!(fs::read_to_string(&file).unwrap(), "2");
         // Neither what is read now is lost, nor what someone else has put there.
         let reading = Staged::new(&target, true, std::slice::from_ref(&file));
-        assert!(matches!(reading, Err(OutputError::Input { .. })));
+        assert!(refused(reading).contains("in it is read"));
         fs::write(target.join("frames/thesis.tex"), "x").unwrap();
-        let Err(OutputError::Foreign { file: foreign, .. }) = written(&target, true, "3") else {
-            panic!("a thesis was thrown away")
-        };
-        assert_eq!(Path::new(&foreign), Path::new("frames/thesis.tex"));
+        let thesis = Path::new("frames/thesis.tex").display().to_string();
+        assert!(refused(written(&target, true, "3")).contains(&thesis), "a thesis was thrown away");
         assert_eq!(names(&target.join("frames")), ["a.obj", "thesis.tex"]);
         fs::remove_file(target.join(LIST)).unwrap();
-        assert!(matches!(written(&target, true, "3"), Err(OutputError::NotOurs { .. })));
+        assert!(refused(written(&target, true, "3")).contains("not written by this program"));
         assert_eq!(names(place.path()), ["out"]);
     }
 
@@ -245,20 +286,20 @@ mod tests {
         // A file, then a folder with something in it, then something more in a folder that is to be replaced.
         let staged = begun(false);
         fs::write(&target, "mine").unwrap();
-        let Err(OutputError::Meanwhile { instead, .. }) = staged.commit() else { panic!("a file is gone") };
+        assert!(refused(staged.commit()).contains("out-2"), "a file is gone");
         assert_eq!(fs::read_to_string(&target).unwrap(), "mine");
-        assert_eq!(names(&instead), [LIST, "a.obj"]);
+        assert_eq!(names(&place.path().join("out-2")), [LIST, "a.obj"]);
         fs::remove_file(&target).unwrap();
         let staged = begun(false);
         fs::create_dir(&target).unwrap();
         fs::write(target.join("own.txt"), "mine").unwrap();
-        assert!(matches!(staged.commit(), Err(OutputError::Meanwhile { .. })));
+        assert!(refused(staged.commit()).contains("something else came"));
         assert_eq!(names(&target), ["own.txt"]);
         fs::remove_dir_all(&target).unwrap();
         begun(false).commit().unwrap();
         let staged = begun(true);
         fs::write(target.join("own.txt"), "mine").unwrap();
-        assert!(matches!(staged.commit(), Err(OutputError::Meanwhile { .. })));
+        assert!(refused(staged.commit()).contains("something else came"));
         assert_eq!(names(&target), [LIST, "a.obj", "own.txt"]);
         assert_eq!(names(place.path()), ["out", "out-2", "out-3", "out-4"]);
     }

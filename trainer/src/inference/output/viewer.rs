@@ -7,8 +7,9 @@
 //! per mesh   u32 faces [F, 3]   u16 positions [frames, V, 3]   u8 heat [frames, V, 2] (strain, distance)
 //! ```
 
-use super::{OutputError, Show};
-use crate::inference::{Drape, DraperError};
+use super::show::Show;
+use super::staged::cannot_write;
+use crate::inference::drape::Drape;
 use crate::picture::{BODY_COLOUR, layer_colour};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -16,41 +17,41 @@ use clothcombo_data::format::atomic;
 use clothcombo_physics::contact::resolve::{Certificate, IntersectedSurface, certify};
 use clothcombo_physics::mesh::vertex_stretch;
 use clothcombo_physics::query::Distance;
+use miette::Report;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::path::Path;
 
 const PAGE: &str = include_str!("viewer.html");
 /// Places in the page that are replaced.
-const SCENE: &str = "/*SCENE*/";
-const DATA: &str = "/*DATA*/";
+const SCENE_PLACE: &str = "/*SCENE*/";
+const DATA_PLACE: &str = "/*DATA*/";
 
 /// Stretch at the end of the strain scale.
-const STRAIN: f64 = 0.25;
+const STRAIN_SCALE: f64 = 0.25;
 /// Ends of the scale of distances to the body (mm).
-const GAP: [f64; 2] = [-10.0, 40.0];
+const GAP_SCALE: [f64; 2] = [-10.0, 40.0];
 /// Most bytes of a page's scene; of a longer motion every so-manieth frame is shown.
-const MOST_BYTES: usize = 96 << 20;
+const MOST_SCENE_BYTES: usize = 96 << 20;
 
-pub(super) fn save(path: &Path, show: &Show) -> Result<(), OutputError> {
+pub(super) fn save(path: &Path, show: &Show) -> Result<(), Report> {
     let page = page(show)?;
-    atomic::write(path, page.as_bytes()).map_err(|reason| OutputError::Io { path: path.into(), reason })
+    atomic::write(path, page.as_bytes()).map_err(|e| cannot_write(path, &e))
 }
 
-fn page(show: &Show) -> Result<String, OutputError> {
+fn page(show: &Show) -> Result<String, Report> {
     let stages = stages(show)?;
     let mut binary = Vec::new();
     let body = &show.draper.body().faces;
-    let still = |stage: &Stage| vec![0u8; 2 * stage.body.len()];
-    let mut meshes =
-        vec![pack(&mut binary, json!({ "name": "body", "colour": BODY_COLOUR, "layer": -1 }), body, |s| {
-            stages.iter().map(|stage| (stage.body, still(stage))).for_each(s)
-        })];
+    let still = vec![0; 2 * show.drapes[0].body.len()];
+    let of_body: Vec<_> = stages.iter().map(|stage| (stage.body, &still[..])).collect();
+    let about = json!({ "name": "body", "colour": BODY_COLOUR, "layer": -1 });
+    let mut meshes = vec![pack(&mut binary, about, body, &of_body)];
     for (layer, garment) in show.outfit.garments.iter().enumerate() {
         let about = json!({ "name": garment.name, "colour": layer_colour(layer), "layer": layer });
-        meshes.push(pack(&mut binary, about, garment.prepared.garment.rest.faces(), |s| {
-            stages.iter().map(|stage| (stage.garments[layer], stage.heat[layer].clone())).for_each(s)
-        }));
+        let frames: Vec<_> =
+            stages.iter().map(|stage| (stage.garments[layer], &stage.heat[layer][..])).collect();
+        meshes.push(pack(&mut binary, about, garment.prepared.garment.rest.faces(), &frames));
     }
     let moves = !show.bodies.moments.is_empty();
     let scene = json!({
@@ -58,16 +59,16 @@ fn page(show: &Show) -> Result<String, OutputError> {
         "moves": moves,
         "first": if moves { 0 } else { stages.len() - 1 },
         "heading": show.drapes[0].heading,
-        "strain": STRAIN,
-        "gap": GAP,
+        "strain": STRAIN_SCALE,
+        "gap": GAP_SCALE,
         "zero": f64::from(gap_byte(0.0)) / 255.0,
         "frames": stages.iter().map(|s| json!({ "name": s.name, "time": s.time })).collect::<Vec<_>>(),
         "meshes": meshes,
     });
     // Inside a script element only `<` could end it.
     let scene = scene.to_string().replace('<', "\\u003c");
-    let (head, rest) = PAGE.split_once(SCENE).unwrap_or((PAGE, ""));
-    let (middle, tail) = rest.split_once(DATA).unwrap_or((rest, ""));
+    let (head, rest) = PAGE.split_once(SCENE_PLACE).unwrap_or((PAGE, ""));
+    let (middle, tail) = rest.split_once(DATA_PLACE).unwrap_or((rest, ""));
     let mut page = String::with_capacity(PAGE.len() + scene.len() + binary.len() * 4 / 3 + 4);
     page.extend([head, &scene, middle]);
     STANDARD.encode_string(&binary, &mut page);
@@ -86,7 +87,7 @@ struct Stage<'a> {
 }
 
 /// The frames of a motion, or the stages of a single drape.
-fn stages<'a>(show: &Show<'a>) -> Result<Vec<Stage<'a>>, DraperError> {
+fn stages<'a>(show: &Show<'a>) -> Result<Vec<Stage<'a>>, Report> {
     if let ([drape], []) = (show.drapes, &show.bodies.moments[..]) {
         let mut states: Vec<(&str, Vec<&[[f64; 3]]>, Option<&Certificate>)> = vec![
             ("linear blend skinning", drape.garments.iter().map(|g| g.skinned.as_slice()).collect(), None),
@@ -104,7 +105,7 @@ fn stages<'a>(show: &Show<'a>) -> Result<Vec<Stage<'a>>, DraperError> {
     let frames = show.drapes.len();
     let vertices: usize = show.draper.body().vertex_count()
         + show.outfit.garments.iter().map(|p| p.prepared.vertex_count()).sum::<usize>();
-    let every = (8 * vertices * frames).div_ceil(MOST_BYTES).max(1);
+    let every = (8 * vertices * frames).div_ceil(MOST_SCENE_BYTES).max(1);
     if every > 1 {
         tracing::info!("viewer.html shows every {every}th of {frames} frames; scene.glb holds all");
     }
@@ -128,13 +129,13 @@ fn stage<'a>(
     time: f64,
     garments: Vec<&'a [[f64; 3]]>,
     certificate: Option<&Certificate>,
-) -> Result<Stage<'a>, DraperError> {
+) -> Result<Stage<'a>, Report> {
     let surface = drape.surface(show.draper);
     let counted;
     let certificate = match certificate {
         Some(certificate) => certificate,
         None => {
-            counted = certify(&surface, &show.outfit.layers(&garments))?;
+            counted = certify(&surface, &show.outfit.layers(&garments)).map_err(|e| show.outfit.named(e))?;
             &counted
         }
     };
@@ -145,7 +146,7 @@ fn stage<'a>(
             positions.par_iter().with_min_len(256).map(|p| surface.gap(*p, Distance::Union).gap).collect();
         let bytes =
             strain.iter().zip(gaps).zip(&intersecting[layer]).flat_map(|((strain, gap), intersects)| {
-                let strain = (255.0 * (strain / STRAIN).min(1.0)).round() as u8;
+                let strain = (255.0 * (strain / STRAIN_SCALE).min(1.0)).round() as u8;
                 [strain, if *intersects { 0 } else { gap_byte(1e3 * gap) }]
             });
         bytes.collect()
@@ -174,30 +175,27 @@ fn intersecting_vertices(show: &Show, certificate: &Certificate) -> Vec<Vec<bool
     intersecting
 }
 
-/// 1–255 within [`GAP`]; 0 is for what intersects.
+/// 1–255 within [`GAP_SCALE`]; 0 is for what intersects.
 fn gap_byte(millimetres: f64) -> u8 {
-    let share = ((millimetres - GAP[0]) / (GAP[1] - GAP[0])).clamp(0.0, 1.0);
+    let share = ((millimetres - GAP_SCALE[0]) / (GAP_SCALE[1] - GAP_SCALE[0])).clamp(0.0, 1.0);
     1 + (254.0 * share).round() as u8
 }
 
-/// Appends a mesh to `binary` and completes what is said `about` it. `frames` hands every frame's positions and heat to its
-/// argument, in order.
-fn pack<'a>(
+/// Appends a mesh with the positions and heat of its `frames` to `binary`, and completes what is said `about` it.
+fn pack(
     binary: &mut Vec<u8>,
     mut about: Value,
     faces: &[[u32; 3]],
-    frames: impl Fn(&mut dyn FnMut((&'a [[f64; 3]], Vec<u8>))),
+    frames: &[(&[[f64; 3]], &[u8])],
 ) -> Value {
-    let (mut low, mut high, mut vertices) = ([f64::MAX; 3], [f64::MIN; 3], 0);
-    frames(&mut |(positions, _)| {
-        vertices = positions.len();
-        for p in positions {
-            for a in 0..3 {
-                low[a] = low[a].min(p[a]);
-                high[a] = high[a].max(p[a]);
-            }
+    let positions = || frames.iter().flat_map(|(positions, _)| *positions);
+    let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
+    for p in positions() {
+        for a in 0..3 {
+            low[a] = low[a].min(p[a]);
+            high[a] = high[a].max(p[a]);
         }
-    });
+    }
     let step: [f64; 3] = std::array::from_fn(|a| ((high[a] - low[a]) / 65535.0).max(1e-9));
     let start = |binary: &mut Vec<u8>| {
         binary.resize(binary.len().next_multiple_of(4), 0);
@@ -206,17 +204,15 @@ fn pack<'a>(
     about["faces"] = json!(start(binary));
     binary.extend(faces.as_flattened().iter().flat_map(|v| v.to_le_bytes()));
     about["positions"] = json!(start(binary));
-    frames(&mut |(positions, _)| {
-        for p in positions {
-            for a in 0..3 {
-                let packed = ((p[a] - low[a]) / step[a]).round().clamp(0.0, 65535.0) as u16;
-                binary.extend_from_slice(&packed.to_le_bytes());
-            }
+    for p in positions() {
+        for a in 0..3 {
+            let packed = ((p[a] - low[a]) / step[a]).round().clamp(0.0, 65535.0) as u16;
+            binary.extend_from_slice(&packed.to_le_bytes());
         }
-    });
+    }
     about["heat"] = json!(start(binary));
-    frames(&mut |(_, heat)| binary.extend_from_slice(&heat));
-    about["vertices"] = json!(vertices);
+    frames.iter().for_each(|(_, heat)| binary.extend_from_slice(heat));
+    about["vertices"] = json!(frames.first().map_or(0, |(positions, _)| positions.len()));
     about["triangles"] = json!(faces.len());
     about["low"] = json!(low);
     about["step"] = json!(step);
@@ -231,9 +227,8 @@ mod tests {
     fn packed_positions_are_within_half_a_step_and_aligned() {
         let frames = [[[0.1, -0.5, 2.0], [0.7, 0.5, 2.0]], [[0.3, 0.0, 2.0], [-0.2, 0.25, 2.0]]];
         let mut binary = vec![7u8; 5];
-        let about = pack(&mut binary, json!({ "name": "tee" }), &[[0, 1, 1]], |each| {
-            frames.iter().for_each(|f| each((f.as_slice(), vec![9; 4])))
-        });
+        let given = frames.each_ref().map(|positions| (positions.as_slice(), [9; 4].as_slice()));
+        let about = pack(&mut binary, json!({ "name": "tee" }), &[[0, 1, 1]], &given);
         let at = |key: &str| about[key].as_u64().unwrap() as usize;
         assert_eq!((at("vertices"), at("triangles"), at("faces") % 4, at("positions") % 4), (2, 1, 0, 0));
         for (i, value) in frames.as_flattened().as_flattened().iter().enumerate() {
@@ -247,7 +242,7 @@ mod tests {
 
     #[test]
     fn the_page_has_both_places_once_and_asks_nobody_for_anything() {
-        assert_eq!((PAGE.matches(SCENE).count(), PAGE.matches(DATA).count()), (1, 1));
+        assert_eq!((PAGE.matches(SCENE_PLACE).count(), PAGE.matches(DATA_PLACE).count()), (1, 1));
         for outside in ["http:", "https:", "//cdn", "src=", "@import", "fetch(", "XMLHttpRequest"] {
             assert!(!PAGE.contains(outside), "{outside}");
         }
@@ -255,6 +250,9 @@ mod tests {
 
     #[test]
     fn gaps_keep_the_lowest_number_for_intersections() {
-        assert_eq!([gap_byte(-50.0), gap_byte(GAP[0]), gap_byte(GAP[1]), gap_byte(900.0)], [1, 1, 255, 255]);
+        assert_eq!(
+            [gap_byte(-50.0), gap_byte(GAP_SCALE[0]), gap_byte(GAP_SCALE[1]), gap_byte(900.0)],
+            [1, 1, 255, 255]
+        );
     }
 }

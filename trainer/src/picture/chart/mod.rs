@@ -1,11 +1,9 @@
 //! Charts as SVG: inline in a page, or drawn as a picture.
 
 pub(crate) mod axis;
-mod bars;
 mod lines;
 mod steps;
 
-pub use bars::{Bar, draw_bars};
 pub use lines::ChartLine;
 pub(crate) use steps::median_of_last;
 pub use steps::{Baseline, RunSteps, StageBoundary};

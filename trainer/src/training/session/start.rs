@@ -4,7 +4,6 @@ use super::Session;
 use super::data_change::changed_data;
 use crate::config::Config;
 use crate::dataset::Dataset;
-use crate::dataset::sizes::DataSizes;
 use crate::evaluation::ValidationSet;
 use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::{Checkpoint, CheckpointState, TrainedModel};
@@ -31,7 +30,7 @@ impl Session {
     /// # Errors
     /// When the networks cannot be made, or the model they start from does not fit.
     pub fn new(run: RunDir, config: Config, dataset: Arc<Dataset>, device: &Device) -> Result<Self, Report> {
-        check_largest(device, largest_tensor(&config, &DataSizes::of(&dataset, &config.data)))?;
+        check_largest(device, largest_tensor(&config, &dataset.sizes(&config.data)))?;
         let device = device.clone().autodiff();
         let model = match &config.init_from {
             None => ClothCombo::new(&config.model, &dataset.dimensions(), config.seed, &device)
@@ -66,7 +65,7 @@ impl Session {
         device: &Device,
         checkpoint: &Checkpoint,
     ) -> Result<Self, Report> {
-        check_largest(device, largest_tensor(&config, &DataSizes::of(&dataset, &config.data)))?;
+        check_largest(device, largest_tensor(&config, &dataset.sizes(&config.data)))?;
         let device = device.clone().autodiff();
         let found = &checkpoint.state;
         let changed_data = changed_data(checkpoint, &dataset, run.allowed())?;
