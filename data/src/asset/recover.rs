@@ -6,18 +6,21 @@
 //! of a covariance is taken by the iteration of Müller, Bender, Chentanez and Macklin, "A robust method to extract the
 //! rotational part of deformations" (MIG 2016).
 
-use super::body::{Body, BodyError, transform};
+use super::body::{Body, BodyError};
 use super::pose::Pose;
-use super::rotation::{Matrix3, apply, axis_angle_from_matrix, matrix_from_axis_angle, product, transpose};
+use super::rotation::{
+    IDENTITY, Matrix3, apply, axis_angle_from_matrix, matrix_from_axis_angle, product, transpose,
+};
+use clothcombo_physics::transform::{self, Transform};
 use clothcombo_physics::vec3::{add, add_scaled, cross, dot, norm, scale, sub};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use thiserror::Error;
 
 /// A mesh whose vertices are farther from the recovered body than this on average is no pose of it (m).
-const FARTHEST: f64 = 0.03;
+const LARGEST_MEAN_DISTANCE: f64 = 0.03;
 /// Rounds over all bones.
-const ROUNDS: usize = 30;
+const BONE_ROUNDS: usize = 30;
 /// Rounds of pose and shape where the shape is not known.
 const SHAPE_ROUNDS: usize = 6;
 /// Bones have no say on vertices they carry less of than this.
@@ -51,13 +54,13 @@ impl From<BodyError> for RecoverError {
 
 /// A rigid motion.
 #[derive(Clone, Copy)]
-struct Bone {
+struct RigidMotion {
     rotation: Matrix3,
     translation: [f64; 3],
 }
 
-impl Bone {
-    fn rows(&self) -> [[f64; 4]; 3] {
+impl RigidMotion {
+    fn transform(&self) -> Transform {
         std::array::from_fn(|a| {
             let [x, y, z] = self.rotation[a];
             [x, y, z, self.translation[a]]
@@ -101,7 +104,7 @@ pub fn recover_body(
     let place = scale(sum, 1.0 / count);
     let distances = posed.iter().zip(&model).map(|(p, m)| norm(sub(sub(*p, *m), place)));
     let mean_distance = distances.sum::<f64>() / count;
-    match mean_distance <= FARTHEST {
+    match mean_distance <= LARGEST_MEAN_DISTANCE {
         true => Ok(RecoveredBody { shape, pose, place, mean_distance }),
         false => Err(RecoverError(format!(
             "no pose of body '{}' comes near it: the vertices stay {:.0} mm away on average",
@@ -193,17 +196,15 @@ fn linear_shape(template: &[[f64; 3]], directions: &[f32], k: usize, rest: &[[f6
 }
 
 /// Bones of linear blend skinning that carry `shaped` closest to `posed`.
-fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Bone> {
+fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<RigidMotion> {
     let mut vertices: Vec<Vec<(usize, f64)>> = vec![Vec::new(); body.joint_count()];
     for v in 0..shaped.len() {
-        let (joints, weights) = body.skin_weights.row(v);
-        for (j, w) in joints.iter().zip(weights).filter(|(_, w)| f64::from(**w) > LEAST_WEIGHT) {
-            vertices[usize::from(*j)].push((v, f64::from(*w)));
+        for (j, w) in body.skin_weights.of_vertex(v).filter(|(_, w)| f64::from(*w) > LEAST_WEIGHT) {
+            vertices[j].push((v, f64::from(w)));
         }
     }
-    let mut bones: Vec<Bone> = Vec::with_capacity(body.joint_count());
-    let unmoved =
-        Bone { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
+    let mut bones: Vec<RigidMotion> = Vec::with_capacity(body.joint_count());
+    let unmoved = RigidMotion { rotation: IDENTITY, translation: [0.0; 3] };
     for j in 0..body.joint_count() {
         let parent = body.parents[j].map_or(unmoved, |p| bones[p]);
         let mostly = vertices[j].iter().map(|&(v, w)| (shaped[v], posed[v], w.powi(4)));
@@ -211,12 +212,11 @@ fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Bon
     }
     let mut skinned: Vec<[f64; 3]> = vec![[0.0; 3]; shaped.len()];
     for (v, s) in skinned.iter_mut().enumerate() {
-        let (joints, weights) = body.skin_weights.row(v);
-        for (j, w) in joints.iter().zip(weights) {
-            *s = add_scaled(*s, f64::from(*w), transform(&bones[usize::from(*j)].rows(), shaped[v]));
+        for (j, w) in body.skin_weights.of_vertex(v) {
+            *s = add_scaled(*s, f64::from(w), transform::apply(&bones[j].transform(), shaped[v]));
         }
     }
-    for _ in 0..ROUNDS {
+    for _ in 0..BONE_ROUNDS {
         for j in 0..bones.len() {
             if vertices[j].is_empty() {
                 // Nothing shows how it is turned: it goes with its parent.
@@ -225,15 +225,16 @@ fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Bon
                 }
                 continue;
             }
-            let old = bones[j].rows();
+            let old = bones[j].transform();
             // What the other bones leave, as if this one carried the vertex alone.
             let wanted = vertices[j].iter().map(|&(v, w)| {
-                let own = transform(&old, shaped[v]);
+                let own = transform::apply(&old, shaped[v]);
                 (shaped[v], add_scaled(own, 1.0 / w, sub(posed[v], skinned[v])), w * w)
             });
             let new = closest_motion(wanted, &bones[j]);
             for &(v, w) in &vertices[j] {
-                let moved = sub(transform(&new.rows(), shaped[v]), transform(&old, shaped[v]));
+                let [now, before] = [new.transform(), old].map(|bone| transform::apply(&bone, shaped[v]));
+                let moved = sub(now, before);
                 skinned[v] = add_scaled(skinned[v], w, moved);
             }
             bones[j] = new;
@@ -243,7 +244,10 @@ fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Bon
 }
 
 /// The rigid motion that carries weighted (from, to) points closest; `start` without points.
-fn closest_motion(points: impl Iterator<Item = ([f64; 3], [f64; 3], f64)> + Clone, start: &Bone) -> Bone {
+fn closest_motion(
+    points: impl Iterator<Item = ([f64; 3], [f64; 3], f64)> + Clone,
+    start: &RigidMotion,
+) -> RigidMotion {
     let mut total = 0.0;
     let (mut from, mut to) = ([0.0; 3], [0.0; 3]);
     for (p, q, w) in points.clone() {
@@ -265,7 +269,7 @@ fn closest_motion(points: impl Iterator<Item = ([f64; 3], [f64; 3], f64)> + Clon
         }
     }
     let rotation = closest_rotation(&covariance, start.rotation);
-    Bone { rotation, translation: sub(to, apply(&rotation, from)) }
+    RigidMotion { rotation, translation: sub(to, apply(&rotation, from)) }
 }
 
 /// The rotation R with the largest tr(RᵀA), from a start.

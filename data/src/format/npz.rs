@@ -138,6 +138,17 @@ impl NpzFile {
         self.wrong(format!("key '{key}' has shape {found:?}, expected {expected}"))
     }
 
+    /// The numbers of `array`, which must be of this shape.
+    ///
+    /// # Errors
+    /// [`FileError`] naming file and key.
+    pub fn of_shape<T>(&self, key: &str, array: Array<T>, shape: &[usize]) -> Result<Vec<T>, FileError> {
+        match array.shape == shape {
+            true => Ok(array.data),
+            false => Err(self.wrong_shape(key, &array.shape, &format!("{shape:?}"))),
+        }
+    }
+
     /// A numeric or boolean array, converted to `f64`. `hint` says what kind of file was expected, should the key be missing.
     ///
     /// # Errors

@@ -130,10 +130,8 @@ impl BaseModel {
         let interleaved = |range: std::ops::Range<usize>| -> Vec<f64> {
             range.flat_map(|i| self.components.directions.iter().map(move |d| d[i])).collect()
         };
-        let weights = (0..BODY_VERTEX_COUNT).map(|v| {
-            let (row_joints, row) = self.rig.skin_weights.row(v);
-            row_joints.iter().copied().zip(row.iter().copied()).collect::<Vec<_>>()
-        });
+        let of_vertex = |v| self.rig.skin_weights.of_vertex(v).map(|(joint, weight)| (joint as u16, weight));
+        let weights = (0..BODY_VERTEX_COUNT).map(of_vertex);
         let shape_directions = interleaved(0..3 * BODY_VERTEX_COUNT).into_iter().map(|x| x as f32).collect();
         Ok(Body::new(BodyParts {
             name: name.into(),

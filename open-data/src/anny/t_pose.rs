@@ -1,8 +1,10 @@
 //! From the rig's A-pose to a T-pose: arms along ±x with palms down, legs straight and nearly vertical, toes forward.
 
 use super::rig::Rig;
-use clothcombo_data::asset::body::{skin, transform};
+use clothcombo_data::asset::body::skin;
 use clothcombo_data::asset::rotation::{IDENTITY, Matrix3, apply, between, matrix_from_axis_angle, product};
+use clothcombo_physics::transform;
+use clothcombo_physics::vec3::{add, sub};
 use rayon::prelude::*;
 
 /// Clavicles rise with the arms.
@@ -63,8 +65,7 @@ pub fn t_pose(rig: &Rig, positions: &[[f64; 3]]) -> Posed {
     let mut bones = Vec::with_capacity(joints.len());
     for (j, joint) in joints.iter().enumerate() {
         if let Some(p) = rig.parents[j] {
-            let turned = apply(&world[p], difference(*joint, joints[p]));
-            places[j] = std::array::from_fn(|a| places[p][a] + turned[a]);
+            places[j] = add(places[p], apply(&world[p], sub(*joint, joints[p])));
         }
         let moved = apply(&world[j], *joint);
         let bone: [[f64; 4]; 3] = std::array::from_fn(|a| {
@@ -77,19 +78,16 @@ pub fn t_pose(rig: &Rig, positions: &[[f64; 3]]) -> Posed {
         .par_iter()
         .with_min_len(2048)
         .enumerate()
-        .map(|(v, p)| {
-            let (row_joints, weights) = rig.skin_weights.row(v);
-            skin(*p, row_joints.iter().zip(weights).map(|(j, w)| (&bones[usize::from(*j)], f64::from(*w))))
-        })
+        .map(|(v, p)| skin(*p, rig.skin_weights.of_vertex(v).map(|(j, w)| (&bones[j], f64::from(w)))))
         .collect();
-    let joints = joints.iter().zip(&bones).map(|(p, b)| transform(b, *p)).collect();
+    let joints = joints.iter().zip(&bones).map(|(p, b)| transform::apply(b, *p)).collect();
     Posed { positions, joints }
 }
 
 /// World rotation of each joint that takes the person's rest pose to the T-pose.
 fn world_rotations(joints: &[[f64; 3]]) -> Vec<Matrix3> {
     let mut world = vec![IDENTITY; joints.len()];
-    let bone = |from: usize, to: usize| difference(joints[to], joints[from]);
+    let bone = |from: usize, to: usize| sub(joints[to], joints[from]);
     for side in &SIDES {
         let s = side.sign;
         let along = [s, 0.0, 0.0];
@@ -125,8 +123,4 @@ fn world_rotations(joints: &[[f64; 3]]) -> Vec<Matrix3> {
         world[side.foot] = world[side.ankle];
     }
     world
-}
-
-fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }

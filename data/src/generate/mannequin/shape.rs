@@ -72,11 +72,10 @@ pub(super) fn vertex_directions(
     let normals = vertex_normals(positions, faces);
     let mut directions = Vec::with_capacity(positions.len() * 3 * COUNT);
     for (v, (p, n)) in positions.iter().zip(&normals).enumerate() {
-        let (joints, weights) = skin_weights.row(v);
         let mut along = [0.0; COUNT];
-        for (j, w) in joints.iter().zip(weights) {
-            let part = thickness(*p, *n, usize::from(*j));
-            (0..COUNT).for_each(|k| along[k] += f64::from(*w) * part[k]);
+        for (j, w) in skin_weights.of_vertex(v) {
+            let part = thickness(*p, *n, j);
+            (0..COUNT).for_each(|k| along[k] += f64::from(w) * part[k]);
         }
         let moved = space(*p);
         for axis in 0..3 {

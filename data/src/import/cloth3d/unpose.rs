@@ -32,9 +32,7 @@ impl Unposing {
         let posed = body.posed(shape, &pose).map_err(|e| e.to_string())?;
         let mut displacement = Vec::with_capacity(3 * body.vertex_count());
         for (v, p) in posed.positions.iter().enumerate() {
-            let (joints, weights) = body.skin_weights.row(v);
-            let bones =
-                joints.iter().zip(weights).map(|(j, w)| (&posed.bones[usize::from(*j)], f64::from(*w)));
+            let bones = body.skin_weights.of_vertex(v).map(|(j, w)| (&posed.bones[j], f64::from(w)));
             let unposed = unskin(*p, bones)
                 .ok_or_else(|| format!("vertex {v} of body '{}' cannot be unposed", body.name))?;
             displacement.extend((0..3).map(|a| (unposed[a] - target.template[v][a]) as f32));
