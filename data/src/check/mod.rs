@@ -100,8 +100,6 @@ impl Checker {
                     file.body = file.take(body::check(path, &mut npz)?);
                 } else if holds_poses(&npz) {
                     file.motion = file.take(motion::check(path)?);
-                } else if npz.contains("positions") && npz.contains("f") {
-                    file.warnings.push("a simulated sequence: training does not read it".into());
                 } else {
                     let path = path.display();
                     return Err(format!(

@@ -1,7 +1,6 @@
 use super::*;
 use crate::asset::{Category, Garment, Motion, Pose, Provenance};
 use crate::folders::{FolderGarment, save_garment_folder};
-use crate::format::npz::NpzWriter;
 use crate::format::obj;
 use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
 use std::fs;
@@ -44,9 +43,6 @@ fn a_dataset_with_good_and_bad_files_is_told_apart() {
     let motion = Motion { name: String::new(), frame_rate: 2.0, poses, source: Provenance::default() };
     motion.save(&folder.path().join("motions/knee.npz")).unwrap();
     fs::write(folder.path().join("motions/cut.npz"), b"PK").unwrap();
-    let mut sequence = NpzWriter::new();
-    sequence.f32("positions", &[1, 3, 3], &[0.0; 9]).u32("f", &[1, 3], &[0, 1, 2]);
-    sequence.save(&folder.path().join("sequence.npz")).unwrap();
     let twice = folder.path().join("twice");
     obj::save(&twice.join("a.obj"), skirt.rest.positions(), skirt.rest.faces(), &[]).unwrap();
     fs::write(twice.join("garments.toml"), "[[garment]]\nfile = \"a.obj\"\n".repeat(2)).unwrap();
@@ -63,7 +59,6 @@ fn a_dataset_with_good_and_bad_files_is_told_apart() {
         unusable,
         ["broken.stl", "centimetres.obj", "tight.obj", "cut.npz", "garments.toml", "missing"]
     );
-    assert!(by_name(&files, "sequence.npz").warnings[0].contains("simulated sequence"));
     let unlisted = by_name(&files, "unlisted.obj");
     assert!(unlisted.garment.is_none() && unlisted.warnings.iter().any(|w| w.contains("garments.toml")));
 

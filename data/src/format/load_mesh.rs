@@ -101,7 +101,7 @@ mod tests {
     use super::*;
     use crate::asset::{Body, BodyFileSettings, Motion};
     use crate::folders::{load_garment_folder, load_motion_folder};
-    use crate::format::{MatFile, PointCache};
+    use crate::format::MatFile;
     use crate::generate::mannequin;
     use crate::import::bvh;
     use std::error::Error;
@@ -111,13 +111,12 @@ mod tests {
     fn no_error_names_its_cause_twice() {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("missing.obj");
-        let errors: [Box<dyn Error>; 8] = [
+        let errors: [Box<dyn Error>; 7] = [
             load_mesh(&missing).unwrap_err().into(),
             Body::load(&missing, &BodyFileSettings::default()).unwrap_err().into(),
             Motion::load(&missing).unwrap_err().into(),
             bvh::load(&missing).unwrap_err().into(),
             MatFile::load(&missing).unwrap_err().into(),
-            PointCache::load(&missing).unwrap_err().into(),
             load_garment_folder(&missing, &mannequin()).unwrap_err().into(),
             load_motion_folder(&missing).unwrap_err().into(),
         ];

@@ -10,7 +10,6 @@ mod load_mesh;
 pub mod mat;
 pub mod npz;
 pub mod obj;
-pub mod pc16;
 mod ply;
 mod point_cache;
 mod polygon_mesh;
@@ -28,6 +27,5 @@ pub use load_mesh::{
 pub use mat::{MatFile, MatValue};
 pub use npz::{Array, NpzFile, NpzWriter};
 pub use obj::ObjMesh;
-pub use pc16::PointCache;
 pub use point_cache::PointFrames;
 pub use polygon_mesh::{MAX_ELEMENTS, MAX_FILE_BYTES, PolygonMesh, read_limited as read_mesh_file};

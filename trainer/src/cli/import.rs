@@ -221,9 +221,6 @@ pub struct Cloth3dArguments {
     /// Body of male samples, the same model [default: the body itself]
     #[arg(long)]
     male: Option<String>,
-    /// Also convert the simulated vertices (.pc16) to npz
-    #[arg(long)]
-    caches: bool,
     #[command(flatten)]
     thinning: ThinningArguments,
     /// Folder to write
@@ -290,7 +287,6 @@ pub fn run(source: &Source) -> Result<(), Report> {
             let bodies = Cloth3dBodies { target: &target, female: female.as_ref(), male: male.as_ref() };
             let settings = Cloth3dSettings {
                 thinning: a.thinning.thinning(),
-                caches: a.caches,
                 body_files: [Some(&a.body), a.female.as_ref(), a.male.as_ref()]
                     .into_iter()
                     .flatten()

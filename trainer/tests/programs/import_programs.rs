@@ -66,7 +66,7 @@ fn a_model_its_motions_and_its_garments_come_in() {
         .stdout(contains("taken    00001_Top: "))
         .stdout(contains("note     female samples were unposed with body 'body_female'"));
     assert!(folder.path().join("cloth3d/garments/garments.toml").exists());
-    assert!(folder.path().join("cloth3d/cloth3d.toml").exists());
+    assert!(folder.path().join("cloth3d/motions/motions.toml").exists());
     import("deepmimic")
         .arg(fixture("deepmimic/humanoid3d_random.txt"))
         .args(["--licence", "Zlib", "-o"])
