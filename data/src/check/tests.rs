@@ -2,7 +2,7 @@ use super::*;
 use crate::asset::{Category, Garment, Motion, Pose, Provenance};
 use crate::folders::{FolderGarment, save_garment_folder};
 use crate::format::obj;
-use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
+use crate::generate::{GarmentGenerator, mannequin};
 use std::fs;
 
 fn by_name<'a>(files: &'a [FileCheck], name: &str) -> &'a FileCheck {
@@ -12,12 +12,11 @@ fn by_name<'a>(files: &'a [FileCheck], name: &str) -> &'a FileCheck {
 #[test]
 fn a_dataset_with_good_and_bad_files_is_told_apart() {
     let body = mannequin();
-    let settings = GarmentSettings { target_vertices: 400, ..GarmentSettings::default() };
     let generator = GarmentGenerator::new(&body).unwrap();
     let garments: Vec<FolderGarment> = [Category::Skirt, Category::TShirt]
         .into_iter()
         .map(|category| FolderGarment {
-            garment: generator.generate(category, 1, &settings).unwrap(),
+            garment: generator.generate(category, 1, 400).unwrap(),
             layer: Some([2, 3]),
             path: PathBuf::new(),
         })

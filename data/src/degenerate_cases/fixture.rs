@@ -3,7 +3,7 @@
 use super::scene::{CaseError, CaseGarment, CaseScene};
 use crate::asset::body::skin;
 use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, skeleton};
-use crate::generate::{GarmentError, GarmentGenerator, GarmentSettings};
+use crate::generate::{GarmentError, GarmentGenerator};
 use clothcombo_physics::mesh::shapes;
 use clothcombo_physics::{MeshError, TriMesh, vec3, vertex_normals};
 
@@ -35,9 +35,8 @@ pub(super) struct Fixture<'a> {
 impl<'a> Fixture<'a> {
     pub(super) fn new(body: &'a Body) -> Result<Self, GarmentError> {
         let generator = GarmentGenerator::new(body)?;
-        let settings = GarmentSettings { target_vertices: GARMENT_VERTICES, ..GarmentSettings::default() };
         let cut = |category| {
-            let garment = generator.generate(category, 1, &settings)?;
+            let garment = generator.generate(category, 1, GARMENT_VERTICES)?;
             let binding = Binding::new(&garment, body, &BindingSettings::default());
             Ok::<_, GarmentError>((garment, binding))
         };

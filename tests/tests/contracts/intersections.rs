@@ -5,7 +5,7 @@
 
 use clothcombo_data::asset::{Binding, BindingSettings, Body, BodyFileSettings, Category, Garment, Pose};
 use clothcombo_data::folders::{load_garment_folder, load_motion_folder};
-use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
+use clothcombo_data::generate::{GarmentGenerator, mannequin};
 use clothcombo_physics::Surface;
 use clothcombo_physics::contact::{
     CountedBody, LayerOrder, Report, ReportGarment, Selection, TriangleTree, all_layers,
@@ -168,10 +168,7 @@ fn posed(body: &Body, garments: &[Garment], shape: &[f64], pose: &Pose) -> (Snap
 fn generated_garments_on_the_mannequin_equal_brute_force() {
     let body = mannequin();
     let generator = GarmentGenerator::new(&body).unwrap();
-    let garment = |category, seed| {
-        let settings = GarmentSettings { target_vertices: 1500, ..GarmentSettings::default() };
-        generator.generate(category, seed, &settings).unwrap()
-    };
+    let garment = |category, seed| generator.generate(category, seed, 1500).unwrap();
     let garments = [garment(Category::TShirt, 3), garment(Category::Trousers, 4)];
     let mut pose = Pose::t_pose(22);
     pose.rotations[1] = [-1.6, 0.1, 0.2];

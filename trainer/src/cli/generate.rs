@@ -11,7 +11,7 @@ use clothcombo_data::folders::{
     FolderGarment, ManifestEntry, read_manifest, refuse_unlisted, save_garment, save_manifest,
 };
 use clothcombo_data::format::obj;
-use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
+use clothcombo_data::generate::GarmentGenerator;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -126,16 +126,15 @@ struct WantedGarment {
 struct GarmentMaker<'a> {
     body: &'a Body,
     generator: GarmentGenerator<'a>,
-    settings: GarmentSettings,
+    vertices: usize,
     folder: &'a Path,
 }
 
 impl<'a> GarmentMaker<'a> {
     fn new(arguments: &'a Arguments, body: &'a Body) -> Result<Self, Report> {
-        let settings = GarmentSettings { target_vertices: arguments.vertices, ..GarmentSettings::default() };
-        settings.check().into_diagnostic()?;
+        GarmentGenerator::check_vertices(arguments.vertices).into_diagnostic()?;
         let generator = GarmentGenerator::new(body).into_diagnostic()?;
-        Ok(Self { body, generator, settings, folder: &arguments.output })
+        Ok(Self { body, generator, vertices: arguments.vertices, folder: &arguments.output })
     }
 
     /// Garment `i` of this run.
@@ -154,7 +153,7 @@ impl<'a> GarmentMaker<'a> {
     /// Refuses a folder in which another garment has the name of this one.
     fn check(&self, WantedGarment { seed, path, .. }: &WantedGarment) -> Result<(), Report> {
         match path.exists() {
-            true => check_source(path, &self.generator.provenance(*seed, &self.settings).source),
+            true => check_source(path, &self.generator.provenance(*seed, self.vertices).source),
             false => Ok(()),
         }
     }
@@ -170,7 +169,7 @@ impl<'a> GarmentMaker<'a> {
                 false => Some(Box::new(ManifestEntry::of(&in_folder(self.load(wanted)?)))),
             }));
         }
-        match self.generator.generate(*category, *seed, &self.settings) {
+        match self.generator.generate(*category, *seed, self.vertices) {
             Ok(garment) => {
                 let entry = save_garment(self.folder, &in_folder(garment)).into_diagnostic()?;
                 Ok(Made::New(Box::new(entry)))
@@ -183,7 +182,7 @@ impl<'a> GarmentMaker<'a> {
     fn load(&self, WantedGarment { category, seed, path }: &WantedGarment) -> Result<Garment, Report> {
         let rest = obj::load(path).into_diagnostic()?;
         let name = GarmentGenerator::name(*category, *seed);
-        let source = self.generator.provenance(*seed, &self.settings);
+        let source = self.generator.provenance(*seed, self.vertices);
         let holding = Garment::needs_holding(&rest, self.body);
         Ok(Garment { name, holding, source, ..Garment::new(*category, rest) })
     }

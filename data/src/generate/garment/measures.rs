@@ -1,6 +1,6 @@
 //! What is measured on a body: tubes around trunk, legs and arms, and landmarks.
 
-use super::settings::GarmentError;
+use super::error::GarmentError;
 use super::tube::Tube;
 use crate::asset::{BODY_JOINT_COUNT, Body};
 use crate::generate::parts::dominant_joints;
