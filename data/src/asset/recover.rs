@@ -301,7 +301,7 @@ mod tests {
     fn scene(seed: u64) -> (Body, Vec<f64>, Pose) {
         let body = mannequin();
         let shape = (0..body.shape_count).map(|k| if k % 2 == 0 { 1.2 } else { -0.7 }).collect();
-        let mut pose = PoseSampler::default().sample(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
+        let mut pose = PoseSampler.sample(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
         pose.rotations[0] = [0.2, 1.9, -0.1];
         (body, shape, pose)
     }

@@ -221,7 +221,7 @@ mod tests {
             assert_eq!(impossible_turn(&clip(joint, rotation, 1)), None, "joint {joint}, {rotation:?}");
         }
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let poses: Vec<Pose> = (0..300).map(|_| PoseSampler::default().sample(&mut rng)).collect();
+        let poses: Vec<Pose> = (0..300).map(|_| PoseSampler.sample(&mut rng)).collect();
         assert_eq!(impossible_turn(&poses), None);
     }
 }

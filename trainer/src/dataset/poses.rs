@@ -96,7 +96,7 @@ impl PoseLibrary {
     /// When the folder cannot be read, one of the two parts is empty, or the frame rates of the clips are no rates.
     pub fn new(config: &PoseConfig, body: &Arc<Body>) -> Result<Self, DatasetError> {
         let source = match &config.motions {
-            None => Source::Sampler(PoseSampler::default()),
+            None => Source::Sampler(PoseSampler),
             Some(folder) => {
                 let clips = load_motion_folder(folder).map_err(DatasetError::data)?;
                 Source::Frames(Box::new(Frames::split(&clips, config, folder)?))

@@ -3,24 +3,15 @@
 use super::figure::{Figure, LEFT};
 use super::limits::limited;
 use crate::asset::Pose;
-use crate::asset::rotation::{axis_angle_from_quaternion, quaternion_from_axis_angle, quaternion_product};
 use rand::{Rng, RngExt};
 use std::f64::consts::PI;
 
 /// Samples poses within [`super::JOINT_LIMITS`]: standing, walking, sitting, reaching, arms raised and bending.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PoseSampler {
-    /// Standard deviation of the independent noise per joint component, in degrees; knees and toes get half of it. Default 4.
-    pub noise_degrees: f64,
-    /// Whether the pelvis turns to a random heading. Default off: gravity and cloth do not see it.
-    pub random_heading: bool,
-}
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoseSampler;
 
-impl Default for PoseSampler {
-    fn default() -> Self {
-        Self { noise_degrees: 4.0, random_heading: false }
-    }
-}
+/// Standard deviation of the independent noise per joint component (degrees); knees and toes get half of it.
+const NOISE: f64 = 4.0;
 
 fn normal<R: Rng + ?Sized>(rng: &mut R, mean: f64, deviation: f64) -> f64 {
     // Box–Muller; two uniform numbers per value keep the stream simple and reproducible.
@@ -54,16 +45,10 @@ impl PoseSampler {
         }
         let mut pose = figure.pose();
         for (joint, rotation) in pose.rotations.iter_mut().enumerate().skip(1) {
-            let deviation =
-                self.noise_degrees.to_radians() * if matches!(joint, 4 | 5 | 10 | 11) { 0.5 } else { 1.0 };
+            let deviation = NOISE.to_radians() * if matches!(joint, 4 | 5 | 10 | 11) { 0.5 } else { 1.0 };
             for component in rotation {
                 *component += normal(rng, 0.0, deviation).clamp(-2.5 * deviation, 2.5 * deviation);
             }
-        }
-        if self.random_heading {
-            let heading = quaternion_from_axis_angle([0.0, between(rng, -PI, PI), 0.0]);
-            let tilt = quaternion_from_axis_angle(pose.rotations[0]);
-            pose.rotations[0] = axis_angle_from_quaternion(quaternion_product(heading, tilt));
         }
         limited(pose)
     }
@@ -192,10 +177,9 @@ mod tests {
 
     #[test]
     fn poses_are_within_limits_deterministic_and_varied() {
-        let sampler = PoseSampler { random_heading: true, ..PoseSampler::default() };
         let sample = |seed| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            (0..500).map(|_| sampler.sample(&mut rng)).collect::<Vec<_>>()
+            (0..500).map(|_| PoseSampler.sample(&mut rng)).collect::<Vec<_>>()
         };
         let poses = sample(7);
         assert_eq!(poses, sample(7));
@@ -218,11 +202,10 @@ mod tests {
     fn hands_hang_below_the_shoulders_and_feet_stay_below_the_hips() {
         let body = mannequin();
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let sampler = PoseSampler::default();
         let count = 300;
         let mut low_hands = 0;
         for _ in 0..count {
-            let posed = body.posed(&[], &sampler.sample(&mut rng)).unwrap();
+            let posed = body.posed(&[], &PoseSampler.sample(&mut rng)).unwrap();
             let joints = posed.joints;
             low_hands += [(20, 16), (21, 17)].iter().filter(|(w, s)| joints[*w][1] < joints[*s][1]).count();
             assert!(joints[7][1] < joints[1][1] + 0.1 && joints[8][1] < joints[2][1] + 0.1);
