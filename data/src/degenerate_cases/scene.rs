@@ -1,6 +1,6 @@
 //! The scene of a degenerate case, and its energies in either precision.
 
-use crate::asset::{BodyError, Garment, Pose};
+use crate::asset::{BodyError, Garment};
 use clothcombo_physics::energy::{
     EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers, TermMap,
 };
@@ -36,10 +36,6 @@ pub struct CaseGarment {
 /// Garments on a posed body, from the body outwards.
 #[derive(Debug, Clone)]
 pub struct CaseScene {
-    /// Shape numbers of the body.
-    pub shape: Vec<f64>,
-    /// Its pose.
-    pub pose: Pose,
     /// The posed body (m).
     pub body: TriMesh,
     /// The garments.

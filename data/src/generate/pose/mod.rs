@@ -10,6 +10,7 @@ mod sampler;
 mod self_contact;
 
 pub use augmentation::PoseAugmentation;
+pub(crate) use folded::bent_on_both_sides;
 pub use folded::folded_poses;
 pub use limb_density::{LimbDensity, uniform_pose};
 pub use limits::{JOINT_LIMITS, JointLimits, is_within_limits, limited};
