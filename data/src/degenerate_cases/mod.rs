@@ -17,7 +17,7 @@ mod rest_shapes;
 mod scene;
 mod suite;
 
-pub use assess::{CaseReport, Outcome, TermReport};
+pub use assess::{CaseOutcome, CaseReport, TermReport};
 pub use case::{DegenerateCase, Expectation};
 pub use scene::{CaseError, CaseGarment, CaseScene};
 pub use suite::DegenerateCases;
