@@ -8,7 +8,7 @@ use clothcombo_data::folders::load_motion_folder;
 use clothcombo_data::format::NpzFile;
 use clothcombo_data::generate::mannequin;
 use clothcombo_data::import::{
-    AmassSettings, AmcSettings, RetargetSettings, Summary, Thinning, UpAxis, import_amass, import_amc,
+    AmassSettings, AmcSettings, RetargetSettings, Summary, Thinning, WorldUp, import_amass, import_amc,
     import_deepmimic,
 };
 use fixture::{files_in, fixture, no_progress, truncations};
@@ -20,7 +20,7 @@ fn every_frame() -> Thinning {
 }
 
 fn amass(out: &Path, thinning: Thinning) -> Summary {
-    let settings = AmassSettings { thinning, up: Some(UpAxis::Z), rate: None };
+    let settings = AmassSettings { thinning, up: Some(WorldUp::Z), rate: None };
     import_amass(&[fixture("amass")], out, &settings, &mut no_progress()).unwrap()
 }
 
@@ -117,7 +117,7 @@ fn the_rate_is_reduced_and_standing_still_dropped() {
 #[test]
 fn a_wrong_up_axis_is_noticed_and_the_right_one_believed() {
     let folder = tempfile::tempdir().unwrap();
-    let settings = AmassSettings { thinning: every_frame(), up: Some(UpAxis::Y), rate: None };
+    let settings = AmassSettings { thinning: every_frame(), up: Some(WorldUp::Y), rate: None };
     let files = [fixture("amass/CMU/02/jump_poses.npz")];
     let summary = import_amass(&files, folder.path(), &settings, &mut no_progress()).unwrap();
     assert!(summary.taken[0].1.contains("check the up axis"), "{summary:?}");
@@ -126,7 +126,7 @@ fn a_wrong_up_axis_is_noticed_and_the_right_one_believed() {
     let mut standing = Motion::load(&folder.path().join("jump.npz")).unwrap();
     standing.poses.iter_mut().for_each(|p| p.rotations[0] = [0.0, 0.3, 0.0]);
     standing.save(&y_up).unwrap();
-    let settings = AmassSettings { thinning: every_frame(), up: Some(UpAxis::Z), rate: None };
+    let settings = AmassSettings { thinning: every_frame(), up: Some(WorldUp::Z), rate: None };
     let summary = import_amass(&[y_up], &folder.path().join("out"), &settings, &mut no_progress()).unwrap();
     assert!(summary.taken[0].1.contains("check the up axis"), "{summary:?}");
 }

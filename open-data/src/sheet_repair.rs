@@ -1,8 +1,9 @@
 //! Polygon soup of a game asset → one oriented manifold sheet, or the reason why not.
 
 use super::reference_surface::boundary_edges;
-use clothcombo_data::mesh::LabelledTriangles;
-use clothcombo_data::mesh::{SplitMesh, clean_faces, join_faces, orient, outwardness, split_fans, weld};
+use clothcombo_data::mesh::{
+    LabelledTriangles, SplitMesh, clean_faces, join_faces, orient, outwardness, split_fans, weld,
+};
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 use std::collections::{HashMap, VecDeque};

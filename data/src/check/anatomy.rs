@@ -4,64 +4,64 @@
 //! mapping or other axes is coarser: knees and elbows that bend backwards or sideways, and joints that turn through
 //! nearly half a circle. Every rotation is split into swing, by which the bone leaves its direction at rest, and twist
 //! about the bone. In 9,000 frames of gymnastics, boxing and dance the bend of knees and elbows stays within 54° of its
-//! plane, and no joint comes within 15° of a bound of [`RANGES`].
+//! plane, and no joint comes within 15° of a bound of [`JOINT_RANGES`].
 
 use crate::asset::rotation::{apply, matrix_from_axis_angle, quaternion_from_axis_angle};
 use crate::asset::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, Pose};
 use std::f64::consts::PI;
 
 /// Bone at rest, largest swing and twist (degrees), and whether a joint is a hinge, by the direction into which it bends.
-struct Range {
+struct TurnRange {
     bone: [f64; 3],
     swing: f64,
     twist: f64,
     hinge: Option<[f64; 3]>,
 }
 
-const UP: [f64; 3] = [0.0, 1.0, 0.0];
-const DOWN: [f64; 3] = [0.0, -1.0, 0.0];
-const LEFT: [f64; 3] = [1.0, 0.0, 0.0];
-const RIGHT: [f64; 3] = [-1.0, 0.0, 0.0];
-const FORWARD: [f64; 3] = [0.0, 0.0, 1.0];
-const BACK: [f64; 3] = [0.0, 0.0, -1.0];
+const UPWARD: [f64; 3] = [0.0, 1.0, 0.0];
+const DOWNWARD: [f64; 3] = [0.0, -1.0, 0.0];
+const TO_LEFT: [f64; 3] = [1.0, 0.0, 0.0];
+const TO_RIGHT: [f64; 3] = [-1.0, 0.0, 0.0];
+const FORWARDS: [f64; 3] = [0.0, 0.0, 1.0];
+const BACKWARDS: [f64; 3] = [0.0, 0.0, -1.0];
 
-const fn ball(bone: [f64; 3], swing: f64, twist: f64) -> Range {
-    Range { bone, swing, twist, hinge: None }
+const fn ball(bone: [f64; 3], swing: f64, twist: f64) -> TurnRange {
+    TurnRange { bone, swing, twist, hinge: None }
 }
 
-const fn hinge(bone: [f64; 3], bends: [f64; 3], twist: f64) -> Range {
-    Range { bone, swing: 170.0, twist, hinge: Some(bends) }
+const fn hinge(bone: [f64; 3], bends: [f64; 3], twist: f64) -> TurnRange {
+    TurnRange { bone, swing: 170.0, twist, hinge: Some(bends) }
 }
 
-const SPINE: Range = ball(UP, 90.0, 90.0);
-const HIP: Range = ball(DOWN, 165.0, 130.0);
-const KNEE: Range = hinge(DOWN, BACK, 75.0);
-const FOOT: Range = ball(FORWARD, 110.0, 90.0);
+const SPINE_RANGE: TurnRange = ball(UPWARD, 90.0, 90.0);
+const HIP_RANGE: TurnRange = ball(DOWNWARD, 165.0, 130.0);
+const KNEE_RANGE: TurnRange = hinge(DOWNWARD, BACKWARDS, 75.0);
+const FOOT_RANGE: TurnRange = ball(FORWARDS, 110.0, 90.0);
 
 /// Of every body joint, in SMPL order.
-const RANGES: [Range; BODY_JOINT_COUNT] = [
-    ball(UP, 180.0, 180.0),
-    HIP,
-    HIP,
-    SPINE,
-    KNEE,
-    KNEE,
-    SPINE,
-    FOOT,
-    FOOT,
-    SPINE,
-    FOOT,
-    FOOT,
-    ball(UP, 100.0, 110.0),
-    ball(LEFT, 80.0, 75.0),
-    ball(RIGHT, 80.0, 75.0),
-    ball(UP, 110.0, 120.0),
-    ball(LEFT, 160.0, 150.0),
-    ball(RIGHT, 160.0, 150.0),
-    hinge(LEFT, FORWARD, 130.0),
-    hinge(RIGHT, FORWARD, 130.0),
-    ball(LEFT, 120.0, 130.0),
-    ball(RIGHT, 120.0, 130.0),
+const JOINT_RANGES: [TurnRange; BODY_JOINT_COUNT] = [
+    ball(UPWARD, 180.0, 180.0),
+    HIP_RANGE,
+    HIP_RANGE,
+    SPINE_RANGE,
+    KNEE_RANGE,
+    KNEE_RANGE,
+    SPINE_RANGE,
+    FOOT_RANGE,
+    FOOT_RANGE,
+    SPINE_RANGE,
+    FOOT_RANGE,
+    FOOT_RANGE,
+    ball(UPWARD, 100.0, 110.0),
+    ball(TO_LEFT, 80.0, 75.0),
+    ball(TO_RIGHT, 80.0, 75.0),
+    ball(UPWARD, 110.0, 120.0),
+    ball(TO_LEFT, 160.0, 150.0),
+    ball(TO_RIGHT, 160.0, 150.0),
+    hinge(TO_LEFT, FORWARDS, 130.0),
+    hinge(TO_RIGHT, FORWARDS, 130.0),
+    ball(TO_LEFT, 120.0, 130.0),
+    ball(TO_RIGHT, 120.0, 130.0),
 ];
 
 /// A hinge bent by more than this (degrees) …
@@ -71,7 +71,7 @@ const OUT_OF_PLANE: [f64; 2] = [80.0, 110.0];
 /// The twist of a bone that points nearly backwards is no number.
 const TWIST_IS_KNOWN: f64 = 150.0;
 /// A recording may have a bad frame; a broken import has many: the least share of frames.
-const LEAST_SHARE: f64 = 0.01;
+const LEAST_FRAME_SHARE: f64 = 0.01;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
@@ -105,7 +105,7 @@ impl Kind {
 
 /// What is impossible about a joint's rotation, and its angle (degrees).
 fn impossible(joint: usize, rotation: [f64; 3]) -> Option<(Kind, f64)> {
-    let Range { bone, swing: most_swing, twist: most_twist, hinge } = &RANGES[joint];
+    let TurnRange { bone, swing: most_swing, twist: most_twist, hinge } = &JOINT_RANGES[joint];
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let turned = apply(&matrix_from_axis_angle(rotation), *bone);
     let swing = dot(turned, *bone).clamp(-1.0, 1.0).acos().to_degrees();
@@ -154,7 +154,8 @@ pub fn impossible_turn<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<
             }
         }
     }
-    let often = |joint: &usize| found[*joint].0 > 0 && found[*joint].0 as f64 >= LEAST_SHARE * frames as f64;
+    let often =
+        |joint: &usize| found[*joint].0 > 0 && found[*joint].0 as f64 >= LEAST_FRAME_SHARE * frames as f64;
     let mut joints: Vec<usize> = (1..BODY_JOINT_COUNT).filter(often).collect();
     joints.sort_by_key(|joint| std::cmp::Reverse(found[*joint].0));
     let (&worst, others) = joints.split_first()?;

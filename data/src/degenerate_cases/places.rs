@@ -8,7 +8,7 @@ use clothcombo_physics::mesh::shapes::{mapped, tube};
 use clothcombo_physics::{TriMesh, vec3, vertex_normals};
 
 /// Layers of the deepest outfit.
-const MOST_LAYERS: usize = 12;
+const STACKED_LAYERS: usize = 12;
 
 pub(super) const PLACE_CASES: &[DegenerateCase] = &[
     bounded("inside the body", "The whole garment lies in the middle of the chest.", |w| {
@@ -73,7 +73,7 @@ pub(super) const PLACE_CASES: &[DegenerateCase] = &[
                 garment.holding = true;
                 CaseGarment { canonical: moved(&shirt.canonical), posed: moved(&shirt.posed), garment }
             };
-            w.scene((0..MOST_LAYERS).map(layer).collect())
+            w.scene((0..STACKED_LAYERS).map(layer).collect())
         },
     ),
 ];

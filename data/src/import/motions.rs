@@ -23,7 +23,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Name of the manifest in a motion folder.
-pub const MANIFEST: &str = "motions.toml";
+pub const MOTION_MANIFEST: &str = "motions.toml";
 
 /// How motions of other skeletons are imported.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,13 +83,17 @@ pub(super) fn write_retargeted(
         let Thinned { poses, frame_rate, note } = thin(poses, frame_rate, &settings.thinning);
         let source = provenance_of(file, &settings.provenance);
         let motion = Motion { name: String::new(), frame_rate, poses, source };
-        Ok(Clip { motion, subject: String::new(), note: format!("{skeleton}, {note}{remark}{warning}") })
+        Ok(ImportedClip {
+            motion,
+            subject: String::new(),
+            note: format!("{skeleton}, {note}{remark}{warning}"),
+        })
     };
     write_motions(&inputs, settings.body_file.as_deref(), out, expected, &import, progress)
 }
 
 /// A clip made from one file.
-pub(super) struct Clip {
+pub(super) struct ImportedClip {
     /// The motion; its name is overwritten.
     pub motion: Motion,
     /// Gender or name of the person, empty where unknown.
@@ -106,13 +110,13 @@ pub(super) struct NamedFile {
 }
 
 #[derive(Default, Serialize, Deserialize)]
-struct Manifest {
+struct MotionManifest {
     #[serde(default)]
-    motion: Vec<Entry>,
+    motion: Vec<MotionEntry>,
 }
 
 #[derive(Serialize, Deserialize)]
-struct Entry {
+struct MotionEntry {
     file: String,
     frames: usize,
     frame_rate: f64,
@@ -164,11 +168,11 @@ pub(super) fn write_motions(
     body_file: Option<&Path>,
     out: &Path,
     expected: &str,
-    import: &(dyn Fn(&Path) -> Result<Clip, String> + Sync),
+    import: &(dyn Fn(&Path) -> Result<ImportedClip, String> + Sync),
     progress: Progress<'_>,
 ) -> Result<Summary, ImportError> {
     let written = |name: &str| out.join(format!("{name}.npz"));
-    let outputs = inputs.iter().map(|input| written(&input.name)).chain([out.join(MANIFEST)]);
+    let outputs = inputs.iter().map(|input| written(&input.name)).chain([out.join(MOTION_MANIFEST)]);
     refuse_overwriting(inputs.iter().map(|input| input.path.as_path()).chain(body_file), outputs)?;
     let mut summary = Summary::default();
     let mut manifest = read_manifest(out)?;
@@ -180,7 +184,7 @@ pub(super) fn write_motions(
             progress("importing motions", done, inputs.len());
             // What no motion file may hold is not written either.
             let valid = clip.and_then(|clip| clip.motion.check().map(|()| clip));
-            let Clip { mut motion, subject, note } = match valid {
+            let ImportedClip { mut motion, subject, note } = match valid {
                 Ok(clip) => clip,
                 Err(reason) => {
                     summary.skipped.push((path.display().to_string(), reason));
@@ -195,7 +199,7 @@ pub(super) fn write_motions(
             summary.taken.push((name.clone(), note));
             summary.written.push(written);
             manifest.motion.retain(|entry| entry.file != file);
-            manifest.motion.push(Entry {
+            manifest.motion.push(MotionEntry {
                 file,
                 frames: motion.poses.len(),
                 frame_rate: motion.frame_rate,
@@ -219,8 +223,8 @@ pub(super) fn write_motions(
     Ok(summary)
 }
 
-fn read_manifest(out: &Path) -> Result<Manifest, FileError> {
-    match toml_file::load(&out.join(MANIFEST)) {
+fn read_manifest(out: &Path) -> Result<MotionManifest, FileError> {
+    match toml_file::load(&out.join(MOTION_MANIFEST)) {
         Err(FileError::Content { path, message }) => {
             Err(FileError::content(&path)(format!("{message}; remove it or choose another folder")))
         }
@@ -228,8 +232,8 @@ fn read_manifest(out: &Path) -> Result<Manifest, FileError> {
     }
 }
 
-fn write_manifest(out: &Path, mut manifest: Manifest) -> Result<PathBuf, FileError> {
-    let path = out.join(MANIFEST);
+fn write_manifest(out: &Path, mut manifest: MotionManifest) -> Result<PathBuf, FileError> {
+    let path = out.join(MOTION_MANIFEST);
     manifest.motion.sort_by(|a, b| a.file.cmp(&b.file));
     toml_file::save(&path, &manifest)?;
     Ok(path)

@@ -4,7 +4,7 @@ use clothcombo_data::mesh::{fan, smallest_sine};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
-struct File {
+struct ProxyFile {
     faces: Vec<u32>,
     #[serde(default)]
     uvs: Vec<Vec<f64>>,
@@ -43,7 +43,8 @@ pub(super) struct Proxy {
 
 impl Proxy {
     pub fn parse(bytes: &[u8]) -> Result<Self, String> {
-        let file: File = serde_json::from_slice(bytes).map_err(|e| format!("not a clothing proxy: {e}"))?;
+        let file: ProxyFile =
+            serde_json::from_slice(bytes).map_err(|e| format!("not a clothing proxy: {e}"))?;
         let Metadata { name, license, references, weights, offsets } = file.metadata;
         let n = references.len();
         if weights.len() != n || offsets.len() != n {

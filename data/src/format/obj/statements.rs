@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::iter;
 
 /// Left by some editors; taken for a part of the first word it would hide the first vertex.
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// One statement.
 #[derive(Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub(super) struct Statement<'a> {
 
 /// The statements of a file, empty lines and comments included.
 pub(super) fn statements(bytes: &[u8]) -> impl Iterator<Item = Statement<'_>> {
-    let mut rest = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+    let mut rest = bytes.strip_prefix(UTF8_MARK).unwrap_or(bytes);
     let mut lines = 0;
     iter::from_fn(move || {
         let first = lines + 1;

@@ -39,7 +39,7 @@ pub(crate) struct BodyMeasures {
 }
 
 /// No vertex of a body is farther from the pelvis (m).
-const FARTHEST: f64 = 5.0;
+const FARTHEST_VERTEX: f64 = 5.0;
 
 impl BodyMeasures {
     /// Measures the zero body.
@@ -54,9 +54,9 @@ impl BodyMeasures {
                 body.joint_count()
             )));
         }
-        if let Some(vertex) = body.template.iter().position(|p| p.iter().any(|x| x.abs() > FARTHEST)) {
+        if let Some(vertex) = body.template.iter().position(|p| p.iter().any(|x| x.abs() > FARTHEST_VERTEX)) {
             return Err(unsuitable(format!(
-                "vertex {vertex} is more than {FARTHEST} m from its pelvis; is it in metres?"
+                "vertex {vertex} is more than {FARTHEST_VERTEX} m from its pelvis; is it in metres?"
             )));
         }
         if let Some(reason) = body.implausibility() {

@@ -1,6 +1,6 @@
 //! Random poses that look like people: a few activities, each a few correlated factors, with noise on every joint.
 
-use super::figure::{Figure, LEFT};
+use super::figure::{LEFT_SIDE, PoseFigure};
 use super::limits::limited;
 use crate::asset::Pose;
 use rand::{Rng, RngExt};
@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 pub struct PoseSampler;
 
 /// Standard deviation of the independent noise per joint component (degrees); knees and toes get half of it.
-const NOISE: f64 = 4.0;
+const JOINT_NOISE: f64 = 4.0;
 
 fn normal<R: Rng + ?Sized>(rng: &mut R, mean: f64, deviation: f64) -> f64 {
     // Box–Muller; two uniform numbers per value keep the stream simple and reproducible.
@@ -45,7 +45,8 @@ impl PoseSampler {
         }
         let mut pose = figure.pose();
         for (joint, rotation) in pose.rotations.iter_mut().enumerate().skip(1) {
-            let deviation = NOISE.to_radians() * if matches!(joint, 4 | 5 | 10 | 11) { 0.5 } else { 1.0 };
+            let deviation =
+                JOINT_NOISE.to_radians() * if matches!(joint, 4 | 5 | 10 | 11) { 0.5 } else { 1.0 };
             for component in rotation {
                 *component += normal(rng, 0.0, deviation).clamp(-2.5 * deviation, 2.5 * deviation);
             }
@@ -55,8 +56,8 @@ impl PoseSampler {
 }
 
 /// At ease: arms mostly down, weight on either leg.
-fn standing<R: Rng + ?Sized>(rng: &mut R) -> Figure {
-    let mut figure = Figure::default();
+fn standing<R: Rng + ?Sized>(rng: &mut R) -> PoseFigure {
+    let mut figure = PoseFigure::default();
     let lowered = normal(rng, 66.0, 9.0);
     let twist = normal(rng, 0.0, 7.0);
     figure.trunk = [normal(rng, 3.0, 6.0), normal(rng, 0.0, 11.0), normal(rng, 0.0, 6.0)];
@@ -78,12 +79,12 @@ fn standing<R: Rng + ?Sized>(rng: &mut R) -> Figure {
 }
 
 /// One moment of a gait: legs in opposite phase, arms against legs, the trunk turning with the arms.
-fn walk<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn walk<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     let phase = between(rng, 0.0, 2.0 * PI);
     let stride = between(rng, 12.0, 38.0);
     let speed = (stride - 12.0) / 26.0;
     for (i, side) in figure.sides.iter_mut().enumerate() {
-        let own = phase + if i == LEFT { 0.0 } else { PI };
+        let own = phase + if i == LEFT_SIDE { 0.0 } else { PI };
         side.hip_flexion = stride * own.sin() + 0.25 * stride;
         // The knee bends most while the leg swings forward.
         let swing = (own + 0.9).cos().max(0.0);
@@ -99,7 +100,7 @@ fn walk<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
 }
 
 /// On a seat or crouching, the knees together or apart.
-fn sit<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn sit<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     let depth = between(rng, 45.0, 95.0);
     let apart = between(rng, 2.0, 20.0);
     for side in &mut figure.sides {
@@ -116,7 +117,7 @@ fn sit<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
 }
 
 /// Leaning forward or to the side.
-fn bend<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn bend<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     figure.trunk = [between(rng, -15.0, 60.0), normal(rng, 0.0, 18.0), normal(rng, 0.0, 14.0)];
     let hinge = between(rng, 0.0, 30.0);
     figure.pelvis[0] = hinge;
@@ -128,7 +129,7 @@ fn bend<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
 }
 
 /// One or both arms sideways or up.
-fn raise_arms<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn raise_arms<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     let both = rng.random::<f64>() < 0.6;
     let lowered = between(rng, -70.0, 30.0);
     let only = usize::from(rng.random::<f64>() < 0.5);
@@ -143,7 +144,7 @@ fn raise_arms<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
 }
 
 /// One or both hands forward.
-fn reach<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn reach<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     let both = rng.random::<f64>() < 0.5;
     let only = usize::from(rng.random::<f64>() < 0.5);
     let forward = between(rng, 25.0, 85.0);
@@ -157,7 +158,7 @@ fn reach<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
 }
 
 /// Hands in front of the belly or chest.
-fn hands_together<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn hands_together<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     let elbow = between(rng, 50.0, 110.0);
     let forward = between(rng, 15.0, 45.0);
     for side in &mut figure.sides {

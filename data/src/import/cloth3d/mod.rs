@@ -11,11 +11,11 @@ mod unpose;
 pub use info::{Gender, OutfitItem, SampleInfo};
 pub use unpose::{Unposing, upright};
 
-use super::motions::{Clip, NamedFile, named, write_motions};
+use super::motions::{ImportedClip, NamedFile, named, write_motions};
 use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
-use super::up_axis::UpAxis;
+use super::up_axis::WorldUp;
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
 use crate::folders::{FolderGarment, save_garment_folder};
 use crate::format::{FileError, folder, obj};
@@ -257,13 +257,13 @@ fn provenance(what: &str) -> Provenance {
 }
 
 /// The poses of a sample as a motion.
-fn motion(info_mat: &Path, settings: &Cloth3dSettings) -> Result<Clip, String> {
+fn motion(info_mat: &Path, settings: &Cloth3dSettings) -> Result<ImportedClip, String> {
     let info = SampleInfo::load(info_mat)?;
     let mut poses = info.poses;
-    poses.iter_mut().for_each(|pose| UpAxis::Z.turn_root_to_y_up(pose));
+    poses.iter_mut().for_each(|pose| WorldUp::Z.turn_root_to_y_up(pose));
     let Thinned { poses, frame_rate, note } = thin(poses, FRAME_RATE, &settings.thinning);
     let folder = info_mat.parent().and_then(Path::file_name).map(|f| f.to_string_lossy().into_owned());
     let source = provenance(&folder.unwrap_or_default());
     let motion = Motion { name: String::new(), frame_rate, poses, source };
-    Ok(Clip { motion, subject: info.gender.name().into(), note })
+    Ok(ImportedClip { motion, subject: info.gender.name().into(), note })
 }

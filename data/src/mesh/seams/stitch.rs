@@ -13,7 +13,7 @@ const SNAP: f64 = 0.2;
 /// Least cosine between the normals of a face before and after.
 const LEAST_TURN: f64 = 0.2;
 /// Attempts, each without what spoiled the one before.
-const ATTEMPTS: usize = 12;
+const STITCH_ATTEMPTS: usize = 12;
 
 /// A sheet whose borders were stitched, over the old vertices.
 #[derive(Debug)]
@@ -43,8 +43,8 @@ pub(super) fn stitch(
         contacts.extend([(ends[0], *e, first), (ends[1], *e, second)]);
     }
     let mut banned = HashSet::new();
-    for _ in 0..ATTEMPTS {
-        let plan = Plan::new(borders, &contacts, &banned, reach);
+    for _ in 0..STITCH_ATTEMPTS {
+        let plan = StitchPlan::new(borders, &contacts, &banned, reach);
         if !plan.joined.contains(&true) {
             return None;
         }
@@ -63,7 +63,7 @@ pub(super) fn stitch(
 }
 
 /// Which vertices become one, and which split an edge.
-struct Plan {
+struct StitchPlan {
     became: Vec<u32>,
     joined: Vec<bool>,
     /// Per border edge the vertices that split it, by their share of it.
@@ -72,7 +72,7 @@ struct Plan {
     pulls: HashMap<u32, Vec<[f64; 3]>>,
 }
 
-impl Plan {
+impl StitchPlan {
     fn new(borders: &Borders, contacts: &[(u32, u32, Facing)], banned: &HashSet<u32>, reach: f64) -> Self {
         let position = |v: u32| borders.positions[v as usize];
         let distance = |a: u32, b: u32| norm(sub(position(a), position(b)));

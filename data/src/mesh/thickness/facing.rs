@@ -10,7 +10,7 @@ const REVERSE: f64 = 0.7;
 /// The ball's other end lies within this cosine straight behind the face.
 const STRAIGHT: f64 = 0.8;
 /// Steps until the ball shrinks no more; few are needed.
-const STEPS: usize = 12;
+const SHRINKING_STEPS: usize = 12;
 
 /// The other side of the cloth.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +42,7 @@ pub(super) fn opposite(
     let normal = scale(normal, 1.0 / length);
     let mut radius = 0.5 * limit;
     let mut touched = None;
-    for _ in 0..STEPS {
+    for _ in 0..SHRINKING_STEPS {
         let centre = add_scaled(p, -radius, normal);
         let found = surface.project(centre)?;
         // Nothing but the face itself: the ball is as large as it gets.

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, HashMap};
 /// Cloth is thinner than this share of the diagonal: 25 mm for a garment of a metre.
 const MOST_SHARE: f64 = 0.025;
 /// Faces of which the thickness is measured to find out whether there is any.
-const SAMPLES: usize = 400;
+const SAMPLED_FACES: usize = 400;
 /// Share of the area that faces another sheet, from which cloth is thick.
 const THICK_SHARE: f64 = 0.7;
 /// A surface is nearly closed if its border is shorter than this many times the root of its area.
@@ -40,7 +40,7 @@ pub fn thickness(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Option<f64> {
         pieces.join(f[0], f[1]);
         pieces.join(f[0], f[2]);
     });
-    let step = (faces.len() / SAMPLES).max(1);
+    let step = (faces.len() / SAMPLED_FACES).max(1);
     let sampled: Vec<u32> = (0..faces.len() as u32).step_by(step).collect();
     let found: Vec<Option<Opposite>> =
         sampled.par_iter().map(|f| opposite(&surface, positions, faces, *f, limit)).collect();
@@ -91,7 +91,7 @@ pub fn sheets(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Option<f64> {
         large.iter().map(|list| ClosestPoint::new(positions.to_vec(), list)).collect();
     let (mut near, mut sampled, mut distances) = (0.0, 0.0, Vec::new());
     for (own, list) in large.iter().enumerate() {
-        for f in list.iter().step_by((faces.len() / SAMPLES).max(1)) {
+        for f in list.iter().step_by((faces.len() / SAMPLED_FACES).max(1)) {
             let centre = centre_and_normal(positions, *f).0;
             let others = surfaces.iter().enumerate().filter(|(other, _)| *other != own);
             let distance = others
