@@ -6,7 +6,7 @@ use clothcombo_data::mesh::{
 };
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::{add, norm, scale, sub};
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 
 /// Vertices closer than this are one (m).
 const WELD_DISTANCE: f64 = 1e-4;
@@ -124,31 +124,13 @@ fn peel_lining(
 ) -> Result<(), String> {
     let facing = outwardness(&sheet.positions, &sheet.faces, body);
     let total: f64 = facing.iter().map(|(_, a)| a).sum();
-    let mut of_edge: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
-    for (f, face) in sheet.faces.iter().enumerate() {
-        for i in 0..3 {
-            let (a, b) = (face[i], face[(i + 1) % 3]);
-            of_edge.entry([a.min(b), a.max(b)]).or_default().push(f as u32);
-        }
-    }
-    let inward = |f: u32| facing[f as usize].0 < -0.15;
+    // At the rim, or beside a face that is gone.
+    let (joined, _) = join_faces(&sheet.positions, &sheet.faces);
     let mut gone = vec![false; sheet.faces.len()];
-    let mut queue: VecDeque<u32> = boundary_edges(&sheet.faces)
-        .iter()
-        .filter_map(|[a, b]| of_edge.get(&[*a.min(b), *a.max(b)])?.first().copied())
-        .filter(|f| inward(*f))
-        .collect();
-    queue.iter().for_each(|f| gone[*f as usize] = true);
-    while let Some(f) = queue.pop_front() {
-        let face = sheet.faces[f as usize];
-        for i in 0..3 {
-            let (a, b) = (face[i], face[(i + 1) % 3]);
-            for g in of_edge.get(&[a.min(b), a.max(b)]).into_iter().flatten() {
-                if !gone[*g as usize] && inward(*g) {
-                    gone[*g as usize] = true;
-                    queue.push_back(*g);
-                }
-            }
+    let mut stack: Vec<usize> = (0..joined.len()).filter(|f| joined[*f].contains(&None)).collect();
+    while let Some(f) = stack.pop() {
+        if facing[f].0 < -0.15 && !std::mem::replace(&mut gone[f], true) {
+            stack.extend(joined[f].iter().flatten().map(|g| *g as usize));
         }
     }
     let area: f64 = gone.iter().zip(&facing).filter(|(g, _)| **g).map(|(_, (_, a))| a).sum();

@@ -73,61 +73,46 @@ const TWIST_IS_KNOWN: f64 = 150.0;
 /// A recording may have a bad frame; a broken import has many: the least share of frames.
 const LEAST_FRAME_SHARE: f64 = 0.01;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    Backwards,
-    Sideways,
-    Swings,
-    Twists,
+/// The likely causes of a hinge that bends the wrong way, and of too wide a turn.
+const WRONG_WAY: &str = "are left and right swapped, or joints mapped to others (`--joints` of the import)?";
+const TOO_WIDE: &str =
+    "are the angles in degrees, the axes other ones, or joints mapped to others (`--joints` of the import)?";
+
+/// A rotation that no joint has.
+#[derive(Clone, Copy, Debug)]
+struct ImpossibleTurn {
+    what: &'static str,
+    /// Degrees.
+    angle: f64,
+    cause: &'static str,
 }
 
-impl Kind {
-    fn text(self, angle: f64) -> String {
-        match self {
-            Self::Backwards => format!("is bent backwards by {angle:.0}°"),
-            Self::Sideways => format!("is bent sideways by {angle:.0}°"),
-            Self::Swings => format!("is bent by {angle:.0}°"),
-            Self::Twists => format!("is twisted by {angle:.0}°"),
-        }
-    }
-
-    fn cause(self) -> &'static str {
-        match self {
-            Self::Backwards | Self::Sideways => {
-                "are left and right swapped, or joints mapped to others (`--joints` of the import)?"
-            }
-            Self::Swings | Self::Twists => {
-                "are the angles in degrees, the axes other ones, or joints mapped to others (`--joints` of the import)?"
-            }
-        }
-    }
-}
-
-/// What is impossible about a joint's rotation, and its angle (degrees).
-fn impossible(joint: usize, rotation: [f64; 3]) -> Option<(Kind, f64)> {
+/// What is impossible about a joint's rotation.
+fn impossible(joint: usize, rotation: [f64; 3]) -> Option<ImpossibleTurn> {
     let TurnRange { bone, swing: most_swing, twist: most_twist, hinge } = &JOINT_RANGES[joint];
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let turned = apply(&matrix_from_axis_angle(rotation), *bone);
     let swing = dot(turned, *bone).clamp(-1.0, 1.0).acos().to_degrees();
     if swing > *most_swing {
-        return Some((Kind::Swings, swing));
+        return Some(ImpossibleTurn { what: "is bent", angle: swing, cause: TOO_WIDE });
     }
     if let Some(bends) = hinge.filter(|_| swing > BENT) {
         let along = dot(turned, bends);
         let side = (1.0 - dot(turned, *bone).powi(2) - along * along).max(0.0).sqrt();
         let out_of_plane = side.atan2(along).to_degrees();
         if out_of_plane > OUT_OF_PLANE[1] {
-            return Some((Kind::Backwards, swing));
+            return Some(ImpossibleTurn { what: "is bent backwards", angle: swing, cause: WRONG_WAY });
         }
         if out_of_plane > OUT_OF_PLANE[0] {
-            return Some((Kind::Sideways, swing));
+            return Some(ImpossibleTurn { what: "is bent sideways", angle: swing, cause: WRONG_WAY });
         }
     }
     let [w, x, y, z] = quaternion_from_axis_angle(rotation);
     let twist = 2.0 * dot([x, y, z], *bone).atan2(w);
     let twist = (twist + PI).rem_euclid(2.0 * PI) - PI;
     let twist = twist.abs().to_degrees();
-    (swing < TWIST_IS_KNOWN && twist > *most_twist).then_some((Kind::Twists, twist))
+    let is_twisted = swing < TWIST_IS_KNOWN && twist > *most_twist;
+    is_twisted.then_some(ImpossibleTurn { what: "is twisted", angle: twist, cause: TOO_WIDE })
 }
 
 /// Whether no joint of a pose but the pelvis turns as none does.
@@ -139,18 +124,17 @@ pub fn is_possible(pose: &Pose) -> bool {
 /// there are none.
 pub fn impossible_turn<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<String> {
     // Of every joint: in how many frames, and the worst of them.
-    let mut found = [(0, 0, 0.0, Kind::Swings); BODY_JOINT_COUNT];
+    let mut found: [(usize, Option<(usize, ImpossibleTurn)>); BODY_JOINT_COUNT] =
+        [(0, None); BODY_JOINT_COUNT];
     let mut frames = 0;
     for (frame, pose) in poses.into_iter().enumerate() {
         frames = frame + 1;
-        for (joint, entry) in found.iter_mut().enumerate().skip(1) {
-            if let Some((kind, angle)) = impossible(joint, pose.rotation(joint)) {
-                let (count, _, worst, _) = *entry;
-                *entry = if angle > worst {
-                    (count + 1, frame, angle, kind)
-                } else {
-                    (count + 1, entry.1, worst, entry.3)
-                };
+        for (joint, (count, worst)) in found.iter_mut().enumerate().skip(1) {
+            if let Some(turn) = impossible(joint, pose.rotation(joint)) {
+                *count += 1;
+                if worst.is_none_or(|(_, before)| turn.angle > before.angle) {
+                    *worst = Some((frame, turn));
+                }
             }
         }
     }
@@ -159,14 +143,13 @@ pub fn impossible_turn<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<
     let mut joints: Vec<usize> = (1..BODY_JOINT_COUNT).filter(often).collect();
     joints.sort_by_key(|joint| std::cmp::Reverse(found[*joint].0));
     let (&worst, others) = joints.split_first()?;
-    let (count, frame, angle, kind) = found[worst];
+    let (count, worst_turn) = found[worst];
+    let (frame, ImpossibleTurn { what, angle, cause }) = worst_turn?;
     let also: Vec<&str> = others.iter().map(|joint| BODY_JOINT_NAMES[*joint]).collect();
     Some(format!(
-        "{} {} in frame {frame}, and beyond the human range in {count} of {frames} frames{}: {}",
+        "{} {what} by {angle:.0}° in frame {frame}, and beyond the human range in {count} of {frames} frames{}: {cause}",
         BODY_JOINT_NAMES[worst],
-        kind.text(angle),
         if also.is_empty() { String::new() } else { format!(", as {} are", also.join(", ")) },
-        kind.cause()
     ))
 }
 

@@ -2,7 +2,9 @@
 
 use crate::asset::Pose;
 use crate::asset::motion::mean_up;
-use crate::asset::rotation::{Matrix3, axis_angle_from_matrix, matrix_from_axis_angle, product};
+use crate::asset::rotation::{
+    IDENTITY, Matrix3, apply, axis_angle_from_matrix, matrix_from_axis_angle, product,
+};
 
 /// The axis that points up in the world of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,11 +33,7 @@ impl WorldUp {
     }
 
     fn component(self, direction: [f64; 3]) -> f64 {
-        match self {
-            Self::Y => direction[1],
-            Self::Z => direction[2],
-            Self::YDown => -direction[1],
-        }
+        apply(&self.to_y_up(), direction)[1]
     }
 
     /// Mean of the world's vertical component of the body's own vertical axis: 1 upright, 0 lying, −1 upside down.
@@ -46,7 +44,7 @@ impl WorldUp {
     /// Turns a world with this axis up into one with y up.
     pub(super) fn to_y_up(self) -> Matrix3 {
         match self {
-            Self::Y => crate::asset::rotation::IDENTITY,
+            Self::Y => IDENTITY,
             // (x, y, z) becomes (x, z, −y).
             Self::Z => [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
             Self::YDown => [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]],

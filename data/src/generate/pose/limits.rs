@@ -81,7 +81,8 @@ pub fn limited(mut pose: Pose) -> Pose {
 }
 
 /// Whether every body joint is within [`JOINT_LIMITS`], to a millionth of a radian.
-pub fn is_within_limits(pose: &Pose) -> bool {
+#[cfg(test)]
+pub(crate) fn is_within_limits(pose: &Pose) -> bool {
     pose.rotations.iter().zip(&JOINT_LIMITS).all(|(rotation, limits)| {
         (0..3).all(|axis| {
             rotation[axis] >= limits.low[axis].to_radians() - 1e-6

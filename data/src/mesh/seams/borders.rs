@@ -1,7 +1,7 @@
 //! Border edges of a sheet, where they lie along their loops, and which of them run along each other.
 
-use clothcombo_physics::mesh::DisjointSets;
-use clothcombo_physics::vec3::{add_scaled, cross, dot, norm, normalized, scale, sub};
+use crate::mesh::clean::pieces;
+use clothcombo_physics::vec3::{add_scaled, dot, norm, normalized, scale, sub};
 use std::collections::HashMap;
 
 /// Least cosine between the directions of two borders that run along each other.
@@ -59,11 +59,7 @@ impl<'a> Borders<'a> {
         let sides = |face: &[u32; 3]| [[face[0], face[1]], [face[1], face[2]], [face[2], face[0]]];
         let key = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
         faces.iter().flat_map(sides).for_each(|side| *uses.entry(key(side)).or_default() += 1);
-        let mut components = DisjointSets::new(positions.len());
-        for face in faces {
-            components.join(face[0], face[1]);
-            components.join(face[0], face[2]);
-        }
+        let mut components = pieces(faces, positions.len());
         let mut edges = Vec::new();
         for (number, face) in faces.iter().enumerate() {
             for side in sides(face).into_iter().filter(|side| uses[&key(*side)] == 1) {
@@ -197,12 +193,6 @@ impl<'a> Borders<'a> {
         }
         best
     }
-}
-
-/// Unit normal of a face with its vertices at `positions`, times twice its area.
-pub(super) fn doubled_area(face: [u32; 3], position: impl Fn(u32) -> [f64; 3]) -> [f64; 3] {
-    let [a, b, c] = face.map(position);
-    cross(sub(b, a), sub(c, a))
 }
 
 /// The mean of some points; the origin for none.

@@ -1,9 +1,10 @@
 //! Two borders become one: vertices become one vertex, and vertices that face an edge split it.
 
-use super::borders::{Borders, Facing, doubled_area, mean};
+use super::borders::{Borders, Facing, mean};
 use super::runs::{FacingEdges, Run};
 use crate::mesh::AREA_SHARE;
 use crate::mesh::clean::diagonal;
+use crate::mesh::triangle::triangle_normal;
 use clothcombo_physics::mesh::DisjointSets;
 use clothcombo_physics::vec3::{dot, norm, sub};
 use std::collections::{HashMap, HashSet};
@@ -196,8 +197,8 @@ fn spoiled(old: &[[f64; 3]], faces: &[[u32; 3]], new: &Stitched) -> HashSet<u32>
         for [a, b] in [[a, b], [b, c], [c, a]] {
             uses.entry([a.min(b), a.max(b)]).or_default().push(*parent);
         }
-        let before = doubled_area(faces[*parent as usize], |v| old[v as usize]);
-        let after = doubled_area(*face, |v| new.positions[v as usize]);
+        let before = triangle_normal(faces[*parent as usize].map(|v| old[v as usize]));
+        let after = triangle_normal(face.map(|v| new.positions[v as usize]));
         let is_flat = a == b || b == c || c == a || norm(after) <= least;
         if is_flat || dot(before, after) < LEAST_TURN * norm(before) * norm(after) {
             spoiled.extend(faces[*parent as usize]);

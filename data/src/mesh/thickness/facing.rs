@@ -2,8 +2,9 @@
 //! Choi, "3D medial axis point approximation using nearest neighbors and the normal field", The Visual Computer 2012) touches the
 //! opposite sheet at its other end.
 
+use crate::mesh::triangle::triangle_normal;
 use clothcombo_physics::query::ClosestPoint;
-use clothcombo_physics::vec3::{add, add_scaled, cross, dot, norm, norm_squared, scale, sub};
+use clothcombo_physics::vec3::{add, add_scaled, dot, norm, norm_squared, scale, sub};
 
 /// Least cosine between the normal of a face and the reverse normal of what it faces.
 const REVERSE: f64 = 0.7;
@@ -22,8 +23,8 @@ pub(super) struct Opposite {
 
 /// Centre of a face and its normal, twice as long as its area.
 pub(super) fn centre_and_normal(positions: &[[f64; 3]], face: [u32; 3]) -> ([f64; 3], [f64; 3]) {
-    let [a, b, c] = face.map(|v| positions[v as usize]);
-    (scale(add(add(a, b), c), 1.0 / 3.0), cross(sub(b, a), sub(c, a)))
+    let corners @ [a, b, c] = face.map(|v| positions[v as usize]);
+    (scale(add(add(a, b), c), 1.0 / 3.0), triangle_normal(corners))
 }
 
 /// The sheet that face `number` has straight behind it within `limit`.
