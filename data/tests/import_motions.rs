@@ -231,7 +231,8 @@ fn acclaim_limbs_point_where_the_actor_points_them() {
     let body = mannequin();
     let settings = AmcSettings {
         retarget: RetargetSettings { thinning: every_frame(), ..RetargetSettings::default() },
-        ..AmcSettings::default()
+        rate: 120.0,
+        skeleton: None,
     };
     let subjects = [fixture("acclaim")];
     let summary = import_amc(&subjects, &body, folder.path(), &settings, None, &mut no_progress()).unwrap();

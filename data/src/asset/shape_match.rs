@@ -44,15 +44,9 @@ pub fn match_shape(
     let mut shape = vec![0.0; k];
     let mut mean_distance = f64::INFINITY;
     for round in 0..=MATCH_ROUNDS {
-        let surface: Vec<[f64; 3]> = (0..body.vertex_count())
-            .step_by(step)
-            .map(|v| {
-                std::array::from_fn(|a| {
-                    let row = &body.shape_directions[(3 * v + a) * k..(3 * v + a + 1) * k];
-                    body.template[v][a] + row.iter().zip(&shape).map(|(d, b)| f64::from(*d) * b).sum::<f64>()
-                })
-            })
-            .collect();
+        // Never refused: there are as many numbers as the body has components.
+        let Ok(shaped) = body.shaped(&shape) else { break };
+        let surface: Vec<[f64; 3]> = shaped.positions.into_iter().step_by(step).collect();
         let closest: Vec<_> =
             surface.iter().map(|p| target.closest_point().project_within(*p, MATCH_REACH)).collect();
         let distances =

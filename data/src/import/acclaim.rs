@@ -21,16 +21,10 @@ use std::path::{Path, PathBuf};
 pub struct AmcSettings {
     /// What all retargeted motions share.
     pub retarget: RetargetSettings,
-    /// Frame rate of the motions, whose files do not say it (frames/s). Default 120, that of the CMU database.
+    /// Frame rate of the motions, whose files do not say it (frames/s). That of the CMU database is 120.
     pub rate: f64,
     /// The skeleton of all motions; `None` takes the one beside each.
     pub skeleton: Option<PathBuf>,
-}
-
-impl Default for AmcSettings {
-    fn default() -> Self {
-        Self { retarget: RetargetSettings::default(), rate: 120.0, skeleton: None }
-    }
 }
 
 /// Imports AMC files, and those that are found in folders, as motion npz files in the folder `out`, retargeted to `body`. The

@@ -6,7 +6,7 @@
 //! here; whoever samples poses removes it.
 
 use super::find_files::find_files;
-use super::motions::{ImportedClip, NamedFile, named, short, stem, write_motions};
+use super::motions::{ImportedClip, named, short, stem, write_motions};
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
 use super::up_axis::{WorldUp, undecided};
@@ -52,7 +52,7 @@ pub fn import_amass(
     settings: &AmassSettings,
     progress: Progress<'_>,
 ) -> Result<Summary, ImportError> {
-    let mut files: Vec<NamedFile> = Vec::new();
+    let mut files = Vec::new();
     let mut axes = HashMap::new();
     let mut notes = Vec::new();
     progress("looking for motions", 0, 1);
@@ -63,7 +63,7 @@ pub fn import_amass(
             notes.push(format!("{}: {} is up, as the bodies stand (--up)", input.display(), axis.name()));
         }
         axes.extend(found.iter().map(|path| (path.clone(), axis.clone())));
-        files.extend(found.into_iter().map(|path| NamedFile { name: clip_name(input, &path), path }));
+        files.extend(found.into_iter().map(|path| (path.clone(), clip_name(input, &path))));
     }
     progress("looking for motions", 1, 1);
     if files.is_empty() {
@@ -71,7 +71,7 @@ pub fn import_amass(
         let where_ = if shown.is_empty() { String::new() } else { format!("{}: ", shown.join(", ")) };
         return Err(ImportError::Refused(format!("{where_}no {EXPECTED} found")));
     }
-    let files = named(files.into_iter().map(|f| (f.path, f.name)));
+    let files = named(files);
     let import = |file: &Path| {
         let axis = axes.get(file).cloned().unwrap_or(Ok(WorldUp::Y));
         import_file(file, axis, settings)
@@ -134,11 +134,9 @@ fn import_file(
     let subject = gender(&mut file);
     let own_source = Provenance::read(&mut file);
     drop(file);
-    let MotionFile { poses, rate, keys, joints, pickled, .. } = {
-        let file = MotionFile::read(path).map_err(|e| short(&e.to_string(), path))?;
-        MotionFile { rate: Some(("", file.frame_rate(settings.rate)?)), ..file }
-    };
-    let frame_rate = rate.map_or(f64::NAN, |(_, rate)| rate);
+    let file = MotionFile::read(path).map_err(|e| short(&e.to_string(), path))?;
+    let frame_rate = file.frame_rate(settings.rate)?;
+    let MotionFile { poses, keys, joints, pickled, .. } = file;
     let mut motion = Motion { name: stem(path), frame_rate, poses, source: own_source };
     motion.check()?;
     if motion.poses.is_empty() {
