@@ -73,11 +73,14 @@ fn garments_come_to_the_zero_body_and_poses_become_motions() {
     assert_eq!(summary.skipped.len(), 9, "{summary:#?}");
     assert!(summary.taken.iter().any(|(name, about)| name == "00001_Top" && about.contains("silk")));
     assert!(
+        summary.taken.iter().any(|(name, about)| name == "motion 00001" && about.starts_with("female, "))
+    );
+    assert!(
         summary.notes.iter().any(|n| n.contains("male samples were unposed with the target body itself"))
     );
 
     // The poses, y up: the first three numbers are the root's, which only carried the turn to z up.
-    assert_eq!(files_in(&out.join("motions")), ["00001.npz", "00002.npz", "motions.toml"]);
+    assert_eq!(files_in(&out.join("motions")), ["00001.npz", "00002.npz"]);
     let motion = Motion::load(&out.join("motions/00001.npz")).unwrap();
     let poses = NpzFile::open(&fixture("expected_cloth3d.npz")).unwrap().numbers("poses_z_up", "").unwrap();
     assert_eq!((motion.poses.len(), poses.shape[0], motion.frame_rate), (6, 6, 30.0));

@@ -6,7 +6,7 @@
 //! here; whoever samples poses removes it.
 
 use super::find_files::find_files;
-use super::motions::{ImportedClip, named, short, stem, write_motions};
+use super::motions::{named, short, stem, write_motions};
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
 use super::up_axis::{WorldUp, undecided};
@@ -123,7 +123,7 @@ fn import_file(
     path: &Path,
     up: Result<WorldUp, String>,
     settings: &AmassSettings,
-) -> Result<ImportedClip, String> {
+) -> Result<(Motion, String), String> {
     let mut file = NpzFile::open(path).map_err(|e| short(&e.to_string(), path))?;
     if !holds_poses(&file) {
         return Err(format!(
@@ -170,7 +170,7 @@ fn import_file(
     if motion.source == Provenance::default() {
         motion.source = provenance(path, joints);
     }
-    Ok(ImportedClip { motion, subject, note })
+    Ok((motion, note))
 }
 
 /// What a skeleton of so many joints is called.

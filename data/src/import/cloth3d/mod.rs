@@ -11,7 +11,7 @@ mod unpose;
 pub use info::{Gender, OutfitItem, SampleInfo};
 pub use unpose::{Unposing, upright};
 
-use super::motions::{ImportedClip, NamedFile, named, write_motions};
+use super::motions::{NamedFile, named, write_motions};
 use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
@@ -56,7 +56,7 @@ impl Default for Cloth3dSettings {
 /// Of the simulations (frames/s).
 const FRAME_RATE: f64 = 30.0;
 
-/// Imports samples to `out`: `garments/*.obj` with `garments.toml`, and `motions/*.npz` with `motions.toml`. `inputs` are sample
+/// Imports samples to `out`: `garments/*.obj` with `garments.toml`, and `motions/*.npz`. `inputs` are sample
 /// folders, or folders of them.
 ///
 /// # Errors
@@ -257,7 +257,7 @@ fn provenance(what: &str) -> Provenance {
 }
 
 /// The poses of a sample as a motion.
-fn motion(info_mat: &Path, settings: &Cloth3dSettings) -> Result<ImportedClip, String> {
+fn motion(info_mat: &Path, settings: &Cloth3dSettings) -> Result<(Motion, String), String> {
     let info = SampleInfo::load(info_mat)?;
     let mut poses = info.poses;
     poses.iter_mut().for_each(|pose| WorldUp::Z.turn_root_to_y_up(pose));
@@ -265,5 +265,5 @@ fn motion(info_mat: &Path, settings: &Cloth3dSettings) -> Result<ImportedClip, S
     let folder = info_mat.parent().and_then(Path::file_name).map(|f| f.to_string_lossy().into_owned());
     let source = provenance(&folder.unwrap_or_default());
     let motion = Motion { name: String::new(), frame_rate, poses, source };
-    Ok(ImportedClip { motion, subject: info.gender.name().into(), note })
+    Ok((motion, format!("{}, {note}", info.gender.name())))
 }
