@@ -41,18 +41,18 @@ fn garments_come_to_the_zero_body_and_poses_become_motions() {
     let out = folder.path();
     let summary = import(&[fixture("cloth3d")], &body("body_female"), out, false).unwrap();
     let garments = load_garment_folder(&out.join("garments"), &body("body_neutral")).unwrap();
-    let names: Vec<&str> = garments.iter().map(|g| g.garment.name.as_str()).collect();
+    let names: Vec<&str> = garments.iter().map(|g| g.name.as_str()).collect();
     assert_eq!(names, ["00001_Top", "00001_Trousers", "00002_Trousers"]);
     for g in &garments {
-        let name = g.garment.name.split('_').nth(1).unwrap();
+        let name = g.name.split('_').nth(1).unwrap();
         // A vertex lies on a body vertex, so that what remains is the text's 0.1 µm and single precision.
-        let deviation = deviation(g.garment.rest.positions(), name);
-        assert!(deviation < 2e-6, "{}: {deviation:e}", g.garment.name);
-        assert!(g.garment.source.licence.contains("non-commercial"));
-        assert_eq!(g.garment.category == Category::Trousers, name == "Trousers");
+        let deviation = deviation(g.rest.positions(), name);
+        assert!(deviation < 2e-6, "{}: {deviation:e}", g.name);
+        assert!(g.source.licence.contains("non-commercial"));
+        assert_eq!(g.category == Category::Trousers, name == "Trousers");
     }
     // Quads and triangles of the file give the same surface.
-    assert_eq!(garments[1].garment.rest.face_count(), 2 * 4 * 6 * 3);
+    assert_eq!(garments[1].rest.face_count(), 2 * 4 * 6 * 3);
 
     for (file, reason) in [
         ("Dress.obj", "No such file"),
@@ -105,9 +105,7 @@ fn smoothed_weights_stay_near_and_the_wrong_body_does_not() {
         let out = tempfile::tempdir_in(folder.path()).unwrap();
         import(&sample, female, out.path(), smooth).unwrap();
         let garments = load_garment_folder(&out.path().join("garments"), female).unwrap();
-        let each = garments
-            .iter()
-            .map(|g| deviation(g.garment.rest.positions(), g.garment.name.split('_').nth(1).unwrap()));
+        let each = garments.iter().map(|g| deviation(g.rest.positions(), g.name.split('_').nth(1).unwrap()));
         each.fold(0.0, f64::max)
     };
     assert!(worst(&body("body_female"), true) < 0.03);

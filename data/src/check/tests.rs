@@ -1,6 +1,6 @@
 use super::*;
 use crate::asset::{Category, Garment, Motion, Pose, Provenance};
-use crate::folders::{FolderGarment, save_garment_folder};
+use crate::folders::save_garment_folder;
 use crate::format::obj;
 use crate::generate::{GarmentGenerator, mannequin};
 use std::fs;
@@ -13,18 +13,14 @@ fn by_name<'a>(files: &'a [FileCheck], name: &str) -> &'a FileCheck {
 fn a_dataset_with_good_and_bad_files_is_told_apart() {
     let body = mannequin();
     let generator = GarmentGenerator::new(&body).unwrap();
-    let garments: Vec<FolderGarment> = [Category::Skirt, Category::TShirt]
-        .into_iter()
-        .map(|category| FolderGarment {
-            garment: generator.generate(category, 1, 400).unwrap(),
-            layer: Some([2, 3]),
-            path: PathBuf::new(),
-        })
-        .collect();
-    let skirt: &Garment = &garments[0].garment;
+    let garments =
+        [Category::Skirt, Category::TShirt].map(|category| generator.generate(category, 1, 400).unwrap());
+    let skirt: &Garment = &garments[0];
     let folder = tempfile::tempdir().unwrap();
     let listed = folder.path().join("listed");
     save_garment_folder(&listed, &garments).unwrap();
+    let manifest = fs::read_to_string(listed.join(MANIFEST)).unwrap();
+    fs::write(listed.join(MANIFEST), manifest.replace("name =", "layer = [2, 3]\nname =")).unwrap();
     fs::write(listed.join("unlisted.obj"), "not read").unwrap();
     let loose = folder.path().join("loose");
     let inside: Vec<[f64; 3]> =

@@ -14,14 +14,14 @@ use archive::read_proxies;
 use clothcombo_data::asset::provenance::CUT_FROM_HELPERS;
 use clothcombo_data::asset::{Body, Category, Garment, Provenance};
 use clothcombo_data::fit::off_trunk;
-use clothcombo_data::folders::garment_folder::{FolderGarment, garment_folder_files, save_garment_folder};
+use clothcombo_data::folders::garment_folder::{garment_folder_files, save_garment_folder};
 use clothcombo_data::import::{ImportError, Progress, Summary, refuse_overwriting};
 use clothcombo_data::mesh::{BodyClearance, LabelledTriangles};
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::query::Surface;
 use proxy::Proxy;
 use rayon::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// What a proxy's name says about it.
 const CATEGORIES: &[(&str, Category)] = &[
@@ -58,7 +58,7 @@ const CATEGORIES: &[(&str, Category)] = &[
 ];
 
 struct Taken {
-    garment: FolderGarment,
+    garment: Garment,
     note: String,
 }
 
@@ -101,11 +101,11 @@ pub fn import_makehuman(
         progress("importing garments", (taken.len() + summary.skipped.len()).min(total), total);
     }
     taken.extend(helper_garments(&model, &body, &surface, &mut summary, progress));
-    taken.sort_by(|a, b| a.garment.garment.name.cmp(&b.garment.garment.name));
-    let garments: Vec<FolderGarment> = taken.iter().map(|t| t.garment.clone()).collect();
+    taken.sort_by(|a, b| a.garment.name.cmp(&b.garment.name));
+    let garments: Vec<Garment> = taken.iter().map(|t| t.garment.clone()).collect();
     refuse_overwriting([package, wheel], garment_folder_files(out, &garments))?;
     summary.written = save_garment_folder(out, &garments)?;
-    summary.taken = taken.into_iter().map(|t| (t.garment.garment.name, t.note)).collect();
+    summary.taken = taken.into_iter().map(|t| (t.garment.name, t.note)).collect();
     summary.notes.push(format!("{} garments taken, {} left out", summary.taken.len(), summary.skipped.len()));
     Ok(summary)
 }
@@ -165,15 +165,7 @@ fn take(
         repairs.join(", ")
     );
     let holding = Garment::needs_holding(&rest, body);
-    let path = PathBuf::from(format!("{name}.obj"));
-    Taken {
-        garment: FolderGarment {
-            garment: Garment { name, holding, source, ..Garment::new(category, rest) },
-            layer: None,
-            path,
-        },
-        note,
-    }
+    Taken { garment: Garment { name, holding, source, ..Garment::new(category, rest) }, note }
 }
 
 fn helper_garments(

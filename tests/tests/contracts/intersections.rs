@@ -192,7 +192,7 @@ fn real_garments_on_the_real_body_equal_brute_force() {
     let body =
         Body::load(&open.join("body.npz"), &BodyFileSettings { shape_components: usize::MAX }).unwrap();
     let all = load_garment_folder(&open.join("garments"), &body).unwrap();
-    let named = |name: &str| all.iter().find(|g| g.garment.name == name).map(|g| g.garment.clone());
+    let named = |name: &str| all.iter().find(|g| g.name == name).cloned();
     let garments =
         ["Tank_Top_01", "Coat"].map(|name| named(name).unwrap_or_else(|| panic!("no garment {name}")));
     let clips = load_motion_folder(&open.join("motions")).unwrap();

@@ -7,9 +7,7 @@ use crate::dataset::load_body;
 use crate::picture::save_png;
 use clap::Parser;
 use clothcombo_data::asset::{Body, Category, Garment};
-use clothcombo_data::folders::{
-    FolderGarment, ManifestEntry, read_manifest, refuse_unlisted, save_garment, save_manifest,
-};
+use clothcombo_data::folders::{ManifestEntry, read_manifest, refuse_unlisted, save_garment, save_manifest};
 use clothcombo_data::format::obj;
 use clothcombo_data::generate::GarmentGenerator;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
@@ -161,17 +159,16 @@ impl<'a> GarmentMaker<'a> {
     /// Makes a garment unless it exists.
     fn make(&self, wanted: &WantedGarment, listed: &HashSet<String>) -> Result<Made, Report> {
         let WantedGarment { category, seed, path } = wanted;
-        let in_folder = |garment| FolderGarment { garment, layer: None, path: PathBuf::new() };
         if path.exists() {
             let is_listed = path.file_name().is_some_and(|name| listed.contains(&*name.to_string_lossy()));
             return Ok(Made::Kept(match is_listed {
                 true => None,
-                false => Some(Box::new(ManifestEntry::of(&in_folder(self.load(wanted)?)))),
+                false => Some(Box::new(ManifestEntry::of(&self.load(wanted)?))),
             }));
         }
         match self.generator.generate(*category, *seed, self.vertices) {
             Ok(garment) => {
-                let entry = save_garment(self.folder, &in_folder(garment)).into_diagnostic()?;
+                let entry = save_garment(self.folder, &garment).into_diagnostic()?;
                 Ok(Made::New(Box::new(entry)))
             }
             Err(e) => Ok(Made::Failed(e.to_string())),

@@ -97,7 +97,7 @@ impl<'a> GarmentLoader<'a> {
     /// [`DatasetError`] naming the file and line, or the design that failed.
     pub fn load(&self, origin: &GarmentSource) -> Result<Garment, DatasetError> {
         match origin {
-            GarmentSource::File(listed) => Ok(listed.load(self.body).map_err(DatasetError::data)?.garment),
+            GarmentSource::File(listed) => listed.load(self.body).map_err(DatasetError::data),
             GarmentSource::Generated { category, seed, vertices } => {
                 let generator = self.generator.as_ref().expect("made for sources with generated garments");
                 generator.generate(*category, *seed, *vertices).map_err(DatasetError::data)

@@ -17,7 +17,7 @@ use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
 use super::up_axis::WorldUp;
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
-use crate::folders::{FolderGarment, save_garment_folder};
+use crate::folders::save_garment_folder;
 use crate::format::{FileError, folder, obj};
 use crate::mesh::contact;
 use clothcombo_physics::query::Surface;
@@ -171,7 +171,7 @@ fn import_sample(
     bodies: &Cloth3dBodies<'_>,
     surface: &Surface<f64>,
     settings: &Cloth3dSettings,
-    garments: &mut Vec<FolderGarment>,
+    garments: &mut Vec<Garment>,
     summary: &mut Summary,
 ) -> Result<(), String> {
     let info = SampleInfo::load(&sample.path.join("info.mat"))?;
@@ -188,8 +188,7 @@ fn import_sample(
             Ok(garment) => {
                 let inside = contact(garment.rest.positions(), surface).inside;
                 summary.taken.push((garment.name.clone(), about(&garment, item, inside)));
-                let path = PathBuf::from(format!("{}.obj", garment.name));
-                garments.push(FolderGarment { garment, layer: None, path });
+                garments.push(garment);
             }
             Err(reason) => summary.skipped.push((mesh_path.display().to_string(), reason)),
         }
