@@ -4,7 +4,7 @@
 //! mapping or other axes is coarser: knees and elbows that bend backwards or sideways, and joints that turn through
 //! nearly half a circle. Every rotation is split into swing, by which the bone leaves its direction at rest, and twist
 //! about the bone. In 9,000 frames of gymnastics, boxing and dance the bend of knees and elbows stays within 54° of its
-//! plane, and no joint comes within 15° of a bound of [`JOINT_RANGES`].
+//! plane, and no joint comes within 15° of a bound of [`turn_range`].
 
 use crate::asset::rotation::{apply, matrix_from_axis_angle, quaternion_from_axis_angle};
 use crate::asset::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, Pose};
@@ -25,44 +25,35 @@ const TO_RIGHT: [f64; 3] = [-1.0, 0.0, 0.0];
 const FORWARDS: [f64; 3] = [0.0, 0.0, 1.0];
 const BACKWARDS: [f64; 3] = [0.0, 0.0, -1.0];
 
-const fn ball(bone: [f64; 3], swing: f64, twist: f64) -> TurnRange {
+fn ball(bone: [f64; 3], swing: f64, twist: f64) -> TurnRange {
     TurnRange { bone, swing, twist, hinge: None }
 }
 
-const fn hinge(bone: [f64; 3], bends: [f64; 3], twist: f64) -> TurnRange {
+fn hinge(bone: [f64; 3], bends: [f64; 3], twist: f64) -> TurnRange {
     TurnRange { bone, swing: 170.0, twist, hinge: Some(bends) }
 }
 
-const SPINE_RANGE: TurnRange = ball(UPWARD, 90.0, 90.0);
-const HIP_RANGE: TurnRange = ball(DOWNWARD, 165.0, 130.0);
-const KNEE_RANGE: TurnRange = hinge(DOWNWARD, BACKWARDS, 75.0);
-const FOOT_RANGE: TurnRange = ball(FORWARDS, 110.0, 90.0);
-
-/// Of every body joint, in SMPL order.
-const JOINT_RANGES: [TurnRange; BODY_JOINT_COUNT] = [
-    ball(UPWARD, 180.0, 180.0),
-    HIP_RANGE,
-    HIP_RANGE,
-    SPINE_RANGE,
-    KNEE_RANGE,
-    KNEE_RANGE,
-    SPINE_RANGE,
-    FOOT_RANGE,
-    FOOT_RANGE,
-    SPINE_RANGE,
-    FOOT_RANGE,
-    FOOT_RANGE,
-    ball(UPWARD, 100.0, 110.0),
-    ball(TO_LEFT, 80.0, 75.0),
-    ball(TO_RIGHT, 80.0, 75.0),
-    ball(UPWARD, 110.0, 120.0),
-    ball(TO_LEFT, 160.0, 150.0),
-    ball(TO_RIGHT, 160.0, 150.0),
-    hinge(TO_LEFT, FORWARDS, 130.0),
-    hinge(TO_RIGHT, FORWARDS, 130.0),
-    ball(TO_LEFT, 120.0, 130.0),
-    ball(TO_RIGHT, 120.0, 130.0),
-];
+/// Of a body joint, by its number in SMPL order.
+fn turn_range(joint: usize) -> TurnRange {
+    match joint {
+        1 | 2 => ball(DOWNWARD, 165.0, 130.0),
+        3 | 6 | 9 => ball(UPWARD, 90.0, 90.0),
+        4 | 5 => hinge(DOWNWARD, BACKWARDS, 75.0),
+        7 | 8 | 10 | 11 => ball(FORWARDS, 110.0, 90.0),
+        12 => ball(UPWARD, 100.0, 110.0),
+        13 => ball(TO_LEFT, 80.0, 75.0),
+        14 => ball(TO_RIGHT, 80.0, 75.0),
+        15 => ball(UPWARD, 110.0, 120.0),
+        16 => ball(TO_LEFT, 160.0, 150.0),
+        17 => ball(TO_RIGHT, 160.0, 150.0),
+        18 => hinge(TO_LEFT, FORWARDS, 130.0),
+        19 => hinge(TO_RIGHT, FORWARDS, 130.0),
+        20 => ball(TO_LEFT, 120.0, 130.0),
+        21 => ball(TO_RIGHT, 120.0, 130.0),
+        // The pelvis may lie or turn over.
+        _ => ball(UPWARD, 180.0, 180.0),
+    }
+}
 
 /// A hinge bent by more than this (degrees) …
 const BENT: f64 = 50.0;
@@ -89,16 +80,16 @@ struct ImpossibleTurn {
 
 /// What is impossible about a joint's rotation.
 fn impossible(joint: usize, rotation: [f64; 3]) -> Option<ImpossibleTurn> {
-    let TurnRange { bone, swing: most_swing, twist: most_twist, hinge } = &JOINT_RANGES[joint];
+    let TurnRange { bone, swing: most_swing, twist: most_twist, hinge } = turn_range(joint);
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let turned = apply(&matrix_from_axis_angle(rotation), *bone);
-    let swing = dot(turned, *bone).clamp(-1.0, 1.0).acos().to_degrees();
-    if swing > *most_swing {
+    let turned = apply(&matrix_from_axis_angle(rotation), bone);
+    let swing = dot(turned, bone).clamp(-1.0, 1.0).acos().to_degrees();
+    if swing > most_swing {
         return Some(ImpossibleTurn { what: "is bent", angle: swing, cause: TOO_WIDE });
     }
     if let Some(bends) = hinge.filter(|_| swing > BENT) {
         let along = dot(turned, bends);
-        let side = (1.0 - dot(turned, *bone).powi(2) - along * along).max(0.0).sqrt();
+        let side = (1.0 - dot(turned, bone).powi(2) - along * along).max(0.0).sqrt();
         let out_of_plane = side.atan2(along).to_degrees();
         if out_of_plane > OUT_OF_PLANE[1] {
             return Some(ImpossibleTurn { what: "is bent backwards", angle: swing, cause: WRONG_WAY });
@@ -108,10 +99,10 @@ fn impossible(joint: usize, rotation: [f64; 3]) -> Option<ImpossibleTurn> {
         }
     }
     let [w, x, y, z] = quaternion_from_axis_angle(rotation);
-    let twist = 2.0 * dot([x, y, z], *bone).atan2(w);
+    let twist = 2.0 * dot([x, y, z], bone).atan2(w);
     let twist = (twist + PI).rem_euclid(2.0 * PI) - PI;
     let twist = twist.abs().to_degrees();
-    let is_twisted = swing < TWIST_IS_KNOWN && twist > *most_twist;
+    let is_twisted = swing < TWIST_IS_KNOWN && twist > most_twist;
     is_twisted.then_some(ImpossibleTurn { what: "is twisted", angle: twist, cause: TOO_WIDE })
 }
 

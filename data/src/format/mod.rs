@@ -21,9 +21,7 @@ pub use error::FileError;
 pub use file_face::FileFace;
 pub use foreign::way_out;
 pub use gltf::{SceneMesh, encode_glb, save_glb};
-pub use load_mesh::{
-    MESH_EXTENSIONS, MeshFormat, is_mesh_path, load_body_mesh, load_mesh, load_tri_mesh, parse_mesh,
-};
+pub use load_mesh::{MeshFormat, is_mesh_path, load_body_mesh, load_mesh, load_tri_mesh, parse_mesh};
 pub use mat::{MatFile, MatValue};
 pub use npz::{Array, NpzFile, NpzWriter};
 pub use obj::ObjMesh;
