@@ -127,15 +127,15 @@ pub(super) struct HelperGarment {
 pub(super) fn cut_helpers<'a>(
     tights: &'a LabelledTriangles,
     skirt: &'a LabelledTriangles,
-    body: &'a Body,
+    body: &Body,
     surface: &'a Surface<f64>,
-) -> impl ExactSizeIterator<Item = HelperGarment> + 'a {
+) -> impl ExactSizeIterator<Item = HelperGarment> + use<'a> {
+    let marks = Marks::new(body);
     DESIGNS.iter().map(move |design| HelperGarment {
         name: design.name,
         category: design.category,
-        result: cut(design, tights, skirt, body)
-            .and_then(|sheet| ease(sheet, design, body, surface))
-            .and_then(|sheet| finish(sheet, surface)),
+        result: cut(design, tights, skirt, &marks)
+            .and_then(|sheet| finish(ease(sheet, design, &marks, surface), surface)),
     })
 }
 
@@ -152,18 +152,10 @@ struct Marks {
 }
 
 impl Marks {
-    fn new(body: &Body) -> Result<Self, String> {
-        let joint = |j: usize| body.joint_template.get(j).copied().ok_or("the body lacks SMPL joints");
-        Ok(Self {
-            hip: joint(1)?,
-            knee: joint(4)?,
-            ankle: joint(7)?,
-            chest: joint(9)?,
-            neck: joint(12)?,
-            shoulder: joint(16)?,
-            elbow: joint(18)?,
-            wrist: joint(20)?,
-        })
+    fn new(body: &Body) -> Self {
+        let [hip, knee, ankle, chest, neck, shoulder, elbow, wrist] =
+            [1, 4, 7, 9, 12, 16, 18, 20].map(|joint: usize| body.joint_template[joint]);
+        Self { hip, knee, ankle, chest, neck, shoulder, elbow, wrist }
     }
 
     fn height(&self, level: Level) -> f64 {
@@ -180,14 +172,13 @@ fn cut(
     design: &HelperDesign,
     tights: &LabelledTriangles,
     skirt: &LabelledTriangles,
-    body: &Body,
+    marks: &Marks,
 ) -> Result<LabelledTriangles, String> {
-    let marks = Marks::new(body)?;
     let pieces = match design.cut {
         Cut::Upper { hem, sleeve, neck } => {
             let hem = marks.height(hem);
-            let mut sheet = tights.clip(|p| p[1] - hem, 1).clip(|p| neckline(&marks, neck, p), 2);
-            sheet = sheet.clip(|p| sleeve_end(&marks, sleeve, p), 4);
+            let mut sheet = tights.clip(|p| p[1] - hem, 1).clip(|p| neckline(marks, neck, p), 2);
+            sheet = sheet.clip(|p| sleeve_end(marks, sleeve, p), 4);
             if design.category == Category::OpenShirt {
                 let middle = marks.neck[2];
                 sheet = sheet.clip(|p| (p[0].abs() - 0.012).max(middle - p[2]), 8);
@@ -248,10 +239,9 @@ fn sleeve_end(marks: &Marks, sleeve: Sleeve, p: [f64; 3]) -> f64 {
 fn ease(
     mut sheet: LabelledTriangles,
     design: &HelperDesign,
-    body: &Body,
+    marks: &Marks,
     surface: &Surface<f64>,
-) -> Result<LabelledTriangles, String> {
-    let marks = Marks::new(body)?;
+) -> LabelledTriangles {
     let (top, bottom) =
         sheet.positions.iter().fold((f64::MIN, f64::MAX), |(t, b), p| (f64::max(t, p[1]), f64::min(b, p[1])));
     let length = (top - bottom).max(1e-6);
@@ -291,5 +281,5 @@ fn ease(
             p[0] = 0.003 * side;
         }
     }
-    Ok(sheet)
+    sheet
 }

@@ -51,13 +51,10 @@ pub(super) fn repair(
     sheet = outermost_piece(sheet, &mut repairs)?;
     turn_outward(&mut sheet, body);
     if boundary_edges(&sheet.faces).is_empty() {
-        open_shell(&mut sheet, body, &mut repairs)?;
+        return Err("closed shell without an opening".into());
     }
     peel_lining(&mut sheet, body, &mut repairs)?;
     fill_small_holes(&mut sheet, &mut repairs);
-    if boundary_edges(&sheet.faces).is_empty() {
-        return Err("closed shell without an opening".into());
-    }
     Ok((sheet, repairs))
 }
 
@@ -93,25 +90,6 @@ fn turn_outward(sheet: &mut LabelledTriangles, body: &Surface<f64>) {
     if sum < 0.0 {
         sheet.faces.iter_mut().for_each(|f| f.swap(1, 2));
     }
-}
-
-/// A closed thick garment: keeps the outside only.
-fn open_shell(
-    sheet: &mut LabelledTriangles,
-    body: &Surface<f64>,
-    repairs: &mut Repairs,
-) -> Result<(), String> {
-    let facing = outwardness(&sheet.positions, &sheet.faces, body);
-    let total = sheet.area();
-    let faces = sheet.faces.iter().zip(&facing).filter(|(_, (d, _))| *d > 0.0).map(|(f, _)| *f).collect();
-    let outside = LabelledTriangles { faces, ..sheet.clone() }.largest_component();
-    let share = outside.area() / total;
-    if !(0.3..0.75).contains(&share) {
-        return Err(format!("closed shell whose outside ({:.0} % of it) is no sheet", 100.0 * share));
-    }
-    repairs.push(format!("took the outer layer of a closed shell ({:.0} % of its area)", 100.0 * share));
-    *sheet = outside;
-    Ok(())
 }
 
 /// Removes faces that look at the body and hang on the rim through such faces: hems folded inwards and linings.

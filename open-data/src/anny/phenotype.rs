@@ -106,44 +106,16 @@ enum PhenotypeAxis {
 }
 
 /// The families of targets: file-name prefix and the axes its parts run over.
-const TARGET_FAMILIES: [(&str, &[PhenotypeAxis]); 5] = [
-    (
-        "macrodetails/universal-",
-        &[PhenotypeAxis::Gender, PhenotypeAxis::Age, PhenotypeAxis::Muscle, PhenotypeAxis::Weight],
-    ),
-    ("macrodetails/", &[PhenotypeAxis::Race, PhenotypeAxis::Gender, PhenotypeAxis::Age]),
-    (
-        "macrodetails/height/",
-        &[
-            PhenotypeAxis::Gender,
-            PhenotypeAxis::Age,
-            PhenotypeAxis::Muscle,
-            PhenotypeAxis::Weight,
-            PhenotypeAxis::Height,
-        ],
-    ),
-    (
-        "macrodetails/proportions/",
-        &[
-            PhenotypeAxis::Gender,
-            PhenotypeAxis::Age,
-            PhenotypeAxis::Muscle,
-            PhenotypeAxis::Weight,
-            PhenotypeAxis::Proportions,
-        ],
-    ),
-    (
-        "breast/",
-        &[
-            PhenotypeAxis::Gender,
-            PhenotypeAxis::Age,
-            PhenotypeAxis::Muscle,
-            PhenotypeAxis::Weight,
-            PhenotypeAxis::CupSize,
-            PhenotypeAxis::Firmness,
-        ],
-    ),
-];
+const TARGET_FAMILIES: [(&str, &[PhenotypeAxis]); 5] = {
+    use PhenotypeAxis::{Age, CupSize, Firmness, Gender, Height, Muscle, Proportions, Race, Weight};
+    [
+        ("macrodetails/universal-", &[Gender, Age, Muscle, Weight]),
+        ("macrodetails/", &[Race, Gender, Age]),
+        ("macrodetails/height/", &[Gender, Age, Muscle, Weight, Height]),
+        ("macrodetails/proportions/", &[Gender, Age, Muscle, Weight, Proportions]),
+        ("breast/", &[Gender, Age, Muscle, Weight, CupSize, Firmness]),
+    ]
+};
 
 /// Sparse displacements (m).
 type Target = Vec<(u32, [f32; 3])>;
