@@ -8,9 +8,7 @@
 
 use super::body::{Body, BodyError};
 use super::pose::Pose;
-use super::rotation::{
-    IDENTITY, Matrix3, apply, axis_angle_from_matrix, matrix_from_axis_angle, product, transpose,
-};
+use super::rotation::{Matrix3, apply, axis_angle_from_matrix, matrix_from_axis_angle, product, transpose};
 use clothcombo_physics::transform::{self, Transform};
 use clothcombo_physics::vec3::{add, add_scaled, cross, dot, norm, scale, sub};
 use faer::linalg::solvers::Solve;
@@ -38,22 +36,6 @@ pub struct RecoveredBody {
     pub place: [f64; 3],
     /// Mean distance of the recovered vertices to the given ones (m).
     pub mean_distance: f64,
-}
-
-/// A rigid motion.
-#[derive(Clone, Copy)]
-struct RigidMotion {
-    rotation: Matrix3,
-    translation: [f64; 3],
-}
-
-impl RigidMotion {
-    fn transform(&self) -> Transform {
-        std::array::from_fn(|a| {
-            let [x, y, z] = self.rotation[a];
-            [x, y, z, self.translation[a]]
-        })
-    }
 }
 
 /// What is known of the shape of a body.
@@ -115,10 +97,14 @@ fn check(body: &Body, which: &str, positions: &[[f64; 3]]) -> Result<(), BodyErr
 fn fitted_pose(body: &Body, shape: &[f64], posed: &[[f64; 3]]) -> Result<Pose, BodyError> {
     let bones = fitted_bones(body, &body.shaped(shape)?.positions, posed);
     let local = |j: usize| match body.parents[j] {
-        Some(parent) => product(&transpose(&bones[parent].rotation), &bones[j].rotation),
-        None => bones[j].rotation,
+        Some(parent) => product(&transpose(&rotation(&bones[parent])), &rotation(&bones[j])),
+        None => rotation(&bones[j]),
     };
     Ok(Pose { rotations: (0..body.joint_count()).map(|j| axis_angle_from_matrix(&local(j))).collect() })
+}
+
+fn rotation(bone: &Transform) -> Matrix3 {
+    bone.map(|[x, y, z, _]| [x, y, z])
 }
 
 /// The shape of a posed mesh. For given rotations the posed vertices are linear in the shape: pose and shape are fitted in turns.
@@ -180,24 +166,23 @@ fn linear_shape(template: &[[f64; 3]], directions: &[f32], k: usize, rest: &[[f6
 }
 
 /// Bones of linear blend skinning that carry `shaped` closest to `posed`.
-fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<RigidMotion> {
+fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Transform> {
     let mut vertices: Vec<Vec<(usize, f64)>> = vec![Vec::new(); body.joint_count()];
     for v in 0..shaped.len() {
         for (j, w) in body.skin_weights.of_vertex(v).filter(|(_, w)| f64::from(*w) > LEAST_WEIGHT) {
             vertices[j].push((v, f64::from(w)));
         }
     }
-    let mut bones: Vec<RigidMotion> = Vec::with_capacity(body.joint_count());
-    let unmoved = RigidMotion { rotation: IDENTITY, translation: [0.0; 3] };
+    let mut bones: Vec<Transform> = Vec::with_capacity(body.joint_count());
     for j in 0..body.joint_count() {
-        let parent = body.parents[j].map_or(unmoved, |p| bones[p]);
+        let parent = body.parents[j].map_or(transform::IDENTITY, |p| bones[p]);
         let mostly = vertices[j].iter().map(|&(v, w)| (shaped[v], posed[v], w.powi(4)));
         bones.push(closest_motion(mostly, &parent));
     }
     let mut skinned: Vec<[f64; 3]> = vec![[0.0; 3]; shaped.len()];
     for (v, s) in skinned.iter_mut().enumerate() {
         for (j, w) in body.skin_weights.of_vertex(v) {
-            *s = add_scaled(*s, f64::from(w), transform::apply(&bones[j].transform(), shaped[v]));
+            *s = add_scaled(*s, f64::from(w), transform::apply(&bones[j], shaped[v]));
         }
     }
     for _ in 0..BONE_ROUNDS {
@@ -209,15 +194,15 @@ fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Rig
                 }
                 continue;
             }
-            let old = bones[j].transform();
+            let old = bones[j];
             // What the other bones leave, as if this one carried the vertex alone.
             let wanted = vertices[j].iter().map(|&(v, w)| {
                 let own = transform::apply(&old, shaped[v]);
                 (shaped[v], add_scaled(own, 1.0 / w, sub(posed[v], skinned[v])), w * w)
             });
-            let new = closest_motion(wanted, &bones[j]);
+            let new = closest_motion(wanted, &old);
             for &(v, w) in &vertices[j] {
-                let [now, before] = [new.transform(), old].map(|bone| transform::apply(&bone, shaped[v]));
+                let [now, before] = [new, old].map(|bone| transform::apply(&bone, shaped[v]));
                 let moved = sub(now, before);
                 skinned[v] = add_scaled(skinned[v], w, moved);
             }
@@ -230,8 +215,8 @@ fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Rig
 /// The rigid motion that carries weighted (from, to) points closest; `start` without points.
 fn closest_motion(
     points: impl Iterator<Item = ([f64; 3], [f64; 3], f64)> + Clone,
-    start: &RigidMotion,
-) -> RigidMotion {
+    start: &Transform,
+) -> Transform {
     let mut total = 0.0;
     let (mut from, mut to) = ([0.0; 3], [0.0; 3]);
     for (p, q, w) in points.clone() {
@@ -252,8 +237,12 @@ fn closest_motion(
             }
         }
     }
-    let rotation = closest_rotation(&covariance, start.rotation);
-    RigidMotion { rotation, translation: sub(to, apply(&rotation, from)) }
+    let rotation = closest_rotation(&covariance, rotation(start));
+    let translation = sub(to, apply(&rotation, from));
+    std::array::from_fn(|a| {
+        let [x, y, z] = rotation[a];
+        [x, y, z, translation[a]]
+    })
 }
 
 /// The rotation R with the largest tr(RᵀA), from a start.
