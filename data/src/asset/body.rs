@@ -297,15 +297,7 @@ impl Body {
                 }
             }
         }
-        (0..joints.len())
-            .map(|j| {
-                let moved = rotation::apply(&rotations[j], joints[j]);
-                std::array::from_fn(|a| {
-                    let r = rotations[j][a];
-                    [r[0], r[1], r[2], places[j][a] - moved[a]]
-                })
-            })
-            .collect()
+        (0..joints.len()).map(|j| rotation::rigid_motion(&rotations[j], joints[j], places[j])).collect()
     }
 
     /// The body of shape `beta` in `pose`: shape, pose correctives, linear blend skinning.

@@ -8,7 +8,9 @@
 
 use super::body::{Body, BodyError};
 use super::pose::Pose;
-use super::rotation::{Matrix3, apply, axis_angle_from_matrix, matrix_from_axis_angle, product, transpose};
+use super::rotation::{
+    Matrix3, axis_angle_from_matrix, matrix_from_axis_angle, product, rigid_motion, transpose,
+};
 use clothcombo_physics::transform::{self, Transform};
 use clothcombo_physics::vec3::{add, add_scaled, cross, dot, norm, scale, sub};
 use faer::linalg::solvers::Solve;
@@ -237,12 +239,7 @@ fn closest_motion(
             }
         }
     }
-    let rotation = closest_rotation(&covariance, rotation(start));
-    let translation = sub(to, apply(&rotation, from));
-    std::array::from_fn(|a| {
-        let [x, y, z] = rotation[a];
-        [x, y, z, translation[a]]
-    })
+    rigid_motion(&closest_rotation(&covariance, rotation(start)), from, to)
 }
 
 /// The rotation R with the largest tr(RᵀA), from a start.

@@ -1,5 +1,6 @@
 //! Rotations as axis-angle vectors, unit quaternions `[w, x, y, z]` and 3×3 matrices (row-major, column vectors).
 
+use clothcombo_physics::transform::Transform;
 use clothcombo_physics::vec3::{cross, dot, norm, norm_squared};
 
 /// A 3×3 matrix, rows first.
@@ -103,6 +104,15 @@ pub fn transpose(m: &Matrix3) -> Matrix3 {
 /// Matrix times vector.
 pub fn apply(m: &Matrix3, v: [f64; 3]) -> [f64; 3] {
     m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+}
+
+/// The motion with this rotation that carries point `from` to point `to`.
+pub fn rigid_motion(rotation: &Matrix3, from: [f64; 3], to: [f64; 3]) -> Transform {
+    let turned = apply(rotation, from);
+    std::array::from_fn(|a| {
+        let [x, y, z] = rotation[a];
+        [x, y, z, to[a] - turned[a]]
+    })
 }
 
 /// The smallest rotation that turns direction `from` into direction `to`; the identity if either is zero.

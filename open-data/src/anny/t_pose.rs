@@ -2,7 +2,9 @@
 
 use super::rig::BaseRig;
 use clothcombo_data::asset::body::skin;
-use clothcombo_data::asset::rotation::{IDENTITY, Matrix3, apply, between, matrix_from_axis_angle, product};
+use clothcombo_data::asset::rotation::{
+    IDENTITY, Matrix3, apply, between, matrix_from_axis_angle, product, rigid_motion,
+};
 use clothcombo_physics::transform;
 use clothcombo_physics::vec3::{add, sub};
 use rayon::prelude::*;
@@ -26,12 +28,7 @@ pub fn t_pose(rig: &BaseRig, positions: &[[f64; 3]]) -> TPosed {
         if let Some(p) = rig.parents[j] {
             places[j] = add(places[p], apply(&world[p], sub(*joint, joints[p])));
         }
-        let moved = apply(&world[j], *joint);
-        let bone: [[f64; 4]; 3] = std::array::from_fn(|a| {
-            let r = world[j][a];
-            [r[0], r[1], r[2], places[j][a] - moved[a]]
-        });
-        bones.push(bone);
+        bones.push(rigid_motion(&world[j], *joint, places[j]));
     }
     let positions = positions
         .par_iter()
