@@ -8,6 +8,7 @@ mod footprint;
 pub mod garment;
 mod garment_material;
 pub mod motion;
+mod normal_equations;
 pub mod pose;
 pub mod provenance;
 mod recover;

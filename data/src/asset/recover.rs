@@ -7,14 +7,13 @@
 //! rotational part of deformations" (MIG 2016).
 
 use super::body::{Body, BodyError};
+use super::normal_equations::NormalEquations;
 use super::pose::Pose;
 use super::rotation::{
     Matrix3, axis_angle_from_matrix, matrix_from_axis_angle, product, rigid_motion, transpose,
 };
 use clothcombo_physics::transform::{self, Transform};
 use clothcombo_physics::vec3::{add, add_scaled, cross, dot, norm, scale, sub};
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
 
 /// A mesh whose vertices are farther from the recovered body than this on average is no pose of it (m).
 const LARGEST_MEAN_DISTANCE: f64 = 0.03;
@@ -141,30 +140,19 @@ fn linear_shape(template: &[[f64; 3]], directions: &[f32], k: usize, rest: &[[f6
         return Vec::new();
     }
     // Unknowns: K shape numbers and a translation. Rows: coordinates.
-    let size = k + 3;
-    let mut gram = vec![vec![0.0; size]; size];
-    let mut right = vec![0.0; size];
-    let mut row = vec![0.0; size];
+    let mut equations = NormalEquations::new(k + 3);
+    let mut row = vec![0.0; k + 3];
     for (v, (p, t)) in rest.iter().zip(template).enumerate() {
         for a in 0..3 {
             let of_coordinate = &directions[(3 * v + a) * k..(3 * v + a + 1) * k];
             row[..k].iter_mut().zip(of_coordinate).for_each(|(r, d)| *r = f64::from(*d));
             (0..3).for_each(|b| row[k + b] = if a == b { 1.0 } else { 0.0 });
-            for i in 0..size {
-                right[i] += row[i] * (p[a] - t[a]);
-                for j in 0..=i {
-                    gram[i][j] += row[i] * row[j];
-                }
-            }
+            equations.add(&row, p[a] - t[a]);
         }
     }
-    for (i, line) in gram.iter_mut().enumerate() {
-        line[i] += RIDGE;
-    }
-    let gram = Mat::from_fn(size, size, |i, j| gram[i.max(j)][i.min(j)]);
-    let Ok(factor) = gram.llt(Side::Lower) else { return vec![0.0; k] };
-    let solution = factor.solve(Mat::from_fn(size, 1, |i, _| right[i]));
-    (0..k).map(|i| solution[(i, 0)]).collect()
+    let mut solution = equations.solution(|_| RIDGE).unwrap_or_else(|| vec![0.0; k]);
+    solution.truncate(k);
+    solution
 }
 
 /// Bones of linear blend skinning that carry `shaped` closest to `posed`.
