@@ -20,7 +20,7 @@ const LARGEST_MEAN_DISTANCE: f64 = 0.03;
 /// Rounds over all bones.
 const BONE_ROUNDS: usize = 30;
 /// Rounds of pose and shape where the shape is not known.
-const SHAPE_ROUNDS: usize = 6;
+const POSED_SHAPE_ROUNDS: usize = 6;
 /// Bones have no say on vertices they carry less of than this.
 const LEAST_WEIGHT: f64 = 0.05;
 /// Weight of small shape numbers against close vertices (m²): decides only what the vertices leave open.
@@ -112,7 +112,7 @@ fn rotation(bone: &Transform) -> Matrix3 {
 fn shape_of_posed(body: &Body, posed: &[[f64; 3]]) -> Result<Vec<f64>, BodyError> {
     let k = body.shape_count;
     let mut shape = vec![0.0; k];
-    for _ in 0..if k == 0 { 0 } else { SHAPE_ROUNDS } {
+    for _ in 0..if k == 0 { 0 } else { POSED_SHAPE_ROUNDS } {
         let pose = fitted_pose(body, &shape, posed)?;
         let start = body.posed(&[], &pose)?.positions;
         let mut directions = vec![0f32; 3 * k * start.len()];

@@ -65,7 +65,7 @@ pub struct MatFile {
 
 const MAT_HEADER: usize = 128;
 /// Metadata files are small; whatever decompresses to more than this is an attack or a mistake (bytes).
-const LARGEST_FILE: u64 = 1 << 28;
+const LARGEST_MAT_FILE: u64 = 1 << 28;
 const DEEPEST_NESTING: usize = 32;
 /// Codes of the data types ("mi…" in the format's description).
 const COMPRESSED: u32 = 15;
@@ -80,7 +80,7 @@ impl MatFile {
         let failed = FileError::io(path);
         let file = fs::File::open(path).map_err(&failed)?;
         let mut bytes = Vec::new();
-        file.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(failed)?;
+        file.take(LARGEST_MAT_FILE + 1).read_to_end(&mut bytes).map_err(failed)?;
         Self::parse(&bytes, path)
     }
 
@@ -91,7 +91,7 @@ impl MatFile {
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, FileError> {
         let wrong = FileError::content(path);
         let not = |reason: &str| wrong(format!("not a MAT-5 file ({reason})"));
-        if bytes.len() as u64 > LARGEST_FILE {
+        if bytes.len() as u64 > LARGEST_MAT_FILE {
             return Err(not("larger than 256 MiB"));
         }
         if bytes.starts_with(b"\x89HDF") || bytes.starts_with(b"MATLAB 7.3") {
@@ -102,7 +102,7 @@ impl MatFile {
             Some(b"MI") => true,
             _ => return Err(not("it has no level-5 header; a level-4 file must be saved again with -v7")),
         };
-        let mut budget = LARGEST_FILE;
+        let mut budget = LARGEST_MAT_FILE;
         let mut file = Self::default();
         let mut rest = MatReader { bytes: &bytes[MAT_HEADER..], big };
         while !rest.bytes.is_empty() {

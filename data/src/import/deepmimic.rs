@@ -46,12 +46,12 @@ const LOWER_SPINE: [usize; 2] = [13, 14];
 const LOWER_NECK: usize = 15;
 /// Wrists do not turn against the forearm; they are needed for its direction.
 const WRISTS: [usize; 2] = [16, 17];
-const JOINT_COUNT: usize = 18;
+const DEEPMIMIC_JOINT_COUNT: usize = 18;
 
 /// The character's joints at rest (m), in its own frame; only the limbs' directions matter.
-fn rest_positions() -> [[f64; 3]; JOINT_COUNT] {
+fn rest_positions() -> [[f64; 3]; DEEPMIMIC_JOINT_COUNT] {
     const RIGHT_SHOULDER: [f64; 3] = [-0.024, 0.4797, 0.1831];
-    let mut rest = [[0.0; 3]; JOINT_COUNT];
+    let mut rest = [[0.0; 3]; DEEPMIMIC_JOINT_COUNT];
     rest[1] = [0.0, 0.2362, 0.0];
     rest[2] = [0.0, 0.4601, 0.0];
     for (side, hip, shoulder, wrist) in [(1.0, 3, 6, WRISTS[1]), (-1.0, 8, 11, WRISTS[0])] {
@@ -72,12 +72,12 @@ const MAP: JointMap = [
 ];
 
 /// World rotations of all joints in one row.
-fn world_rotations(row: &[f64]) -> [Matrix3; JOINT_COUNT] {
+fn world_rotations(row: &[f64]) -> [Matrix3; DEEPMIMIC_JOINT_COUNT] {
     let turn = |column: usize| -> [f64; 3] {
         axis_angle_from_quaternion([row[column], row[column + 1], row[column + 2], row[column + 3]])
     };
     let root = matrix_from_axis_angle(turn(ROOT_COLUMN));
-    let mut world = [root; JOINT_COUNT];
+    let mut world = [root; DEEPMIMIC_JOINT_COUNT];
     for (i, (column, hinge, parent)) in ROW.into_iter().enumerate() {
         let local = if hinge { [0.0, 0.0, row[column]] } else { turn(column) };
         world[i + 1] = product(&world[parent], &matrix_from_axis_angle(local));

@@ -7,9 +7,6 @@ use clothcombo_data::format::{FileError, ObjMesh};
 use serde::Deserialize;
 use std::collections::HashMap;
 
-/// SMPL-X's joint count.
-pub const JOINT_COUNT: usize = 55;
-
 /// Bones of the rig for the 22 body joints.
 const BODY_BONES: [&str; 22] = [
     "pelvis",
@@ -76,7 +73,7 @@ impl BaseRig {
         let all: HashMap<String, RigBone> =
             serde_json::from_slice(&bytes).map_err(|e| wheel.error(RIG, e.to_string()))?;
         let bones = bone_names();
-        let mut joint_vertices = Vec::with_capacity(JOINT_COUNT);
+        let mut joint_vertices = Vec::with_capacity(bones.len());
         for (joint, bone) in bones.iter().enumerate() {
             let vertices = match bone {
                 Some(bone) => {
@@ -120,7 +117,7 @@ impl BaseRig {
         Ok(Self {
             joint_vertices,
             parents,
-            joint_names: skeleton::joint_names(JOINT_COUNT),
+            joint_names: skeleton::joint_names(bones.len()),
             skin_weights: SparseSkinWeights::from_rows(rows),
         })
     }

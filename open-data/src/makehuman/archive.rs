@@ -7,9 +7,6 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 use tar::Archive;
 
-/// Larger files are no proxies.
-const LARGEST_FILE: u64 = 64 << 20;
-
 /// Whether a path in the package is a clothing proxy: `…/proxies/clothes/<name>/<name>.json`.
 fn is_proxy(path: &Path) -> bool {
     let parts: Vec<_> = path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
@@ -39,11 +36,11 @@ fn from_tarball(package: &Path) -> std::io::Result<Vec<(String, Vec<u8>)>> {
     let mut archive = Archive::new(GzDecoder::new(BufReader::new(File::open(package)?)));
     let mut proxies = Vec::new();
     for entry in archive.entries()? {
-        let entry = entry?;
+        let mut entry = entry?;
         let path = entry.path()?.into_owned();
-        if is_proxy(&path) && entry.size() < LARGEST_FILE {
+        if is_proxy(&path) {
             let mut bytes = Vec::new();
-            entry.take(LARGEST_FILE).read_to_end(&mut bytes)?;
+            entry.read_to_end(&mut bytes)?;
             proxies.push((stem(&path), bytes));
         }
     }

@@ -11,7 +11,7 @@ const FOLDED: f64 = 0.9;
 /// Two points of one loop face each other only if the way along it is this many times the distance: a corner is no seam.
 const DETOUR: f64 = 3.0;
 /// A longer edge, in cells of the grid, is no part of a seam.
-const LONGEST_EDGE: f64 = 128.0;
+const LONGEST_SEAM_EDGE: f64 = 128.0;
 /// More edges in one cell of the grid are a heap, not a seam: comparing all of them would not end.
 const CROWDED_CELL: usize = 512;
 
@@ -118,7 +118,7 @@ impl<'a> Borders<'a> {
         }
         for (edge, number) in self.edges.iter().zip(0..) {
             let steps = (2.0 * edge.length / self.cell).ceil().max(1.0);
-            if steps > LONGEST_EDGE {
+            if steps > LONGEST_SEAM_EDGE {
                 continue;
             }
             let start = self.positions[edge.ends[0] as usize];
