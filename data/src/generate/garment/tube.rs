@@ -3,7 +3,7 @@
 use super::super::field::smooth_step;
 
 /// Directions per outline.
-pub(crate) const DIRECTIONS: usize = 32;
+const DIRECTIONS: usize = 32;
 /// Distance between slices (m).
 const TUBE_SLICE: f64 = 0.015;
 
