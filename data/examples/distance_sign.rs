@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let count: usize = arguments.get(1).map_or(Ok(20), |n| n.parse())?;
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let sampler = PoseSampler::default();
+    let sampler = PoseSampler;
     let sampled = (0..count).map(|_| sampler.sample(&mut rng)).collect();
     let mut groups = vec![("T-pose", vec![Pose::t_pose(BODY_JOINT_COUNT)]), ("sampled poses", sampled)];
     groups.extend(folded_poses().into_iter().map(|(name, pose)| (name, vec![pose])));

@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let count: usize = arguments.get(2).map_or(Ok(300), |n| n.parse())?;
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let sampler = PoseSampler::default();
+    let sampler = PoseSampler;
     let sampled = (0..count).map(|_| sampler.sample(&mut rng)).collect();
     let mut groups: Vec<(&str, Vec<Pose>)> = vec![("sampled", sampled)];
     if let Some(folder) = arguments.get(1) {

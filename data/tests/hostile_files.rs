@@ -5,7 +5,7 @@ mod fixture;
 mod hostile;
 
 use clothcombo_data::asset::{BindingSettings, Body, BodyFileSettings, Motion};
-use clothcombo_data::format::{MatFile, NpzFile, PointCache};
+use clothcombo_data::format::{MatFile, NpzFile};
 use clothcombo_data::import::{
     AmassSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Summary, Thinning, acclaim, bvh,
     import_amass, import_cloth3d, import_deepmimic, import_smpl_family,
@@ -176,15 +176,10 @@ fn motions_of_others() {
 }
 
 #[test]
-fn matrices_and_point_caches() {
+fn matrices() {
     let seeds = ["mat/kinds.mat", "mat/kinds_compressed.mat", "cloth3d/00001/info.mat"].map(bytes_of);
     survive("info.mat", &seeds, 0.2..1.0, 64 * MEGABYTE, damaged, |bytes| {
         reason(MatFile::parse(bytes, Path::new("info.mat")))
-    });
-    let slot = Slot::new("Top.pc16");
-    let seeds = [bytes_of("cloth3d/00001/Top.pc16")];
-    survive("Top.pc16", &seeds, 0.2..1.0, 16 * MEGABYTE, damaged, |bytes| {
-        reason(PointCache::load(slot.with(bytes)))
     });
 }
 
@@ -194,17 +189,11 @@ fn simulated_samples() {
     let folder = tempfile::tempdir().unwrap();
     let sample = folder.path().join("00001");
     fs::create_dir(&sample).unwrap();
-    let names = ["Top.obj", "Trousers.obj", "Top.pc16", "info.mat"];
+    let names = ["Top.obj", "Trousers.obj", "info.mat"];
     let whole = names.map(|name| bytes_of(&format!("cloth3d/00001/{name}")));
-    // The other garment's simulation is wrong in that sample: one of the same frames and 96 points at the origin.
-    let mut simulation = whole[2][..32].to_vec();
-    simulation[16..20].copy_from_slice(&96i32.to_le_bytes());
-    simulation.resize(32 + 6 * 96 * (whole[2].len() - 32) / (6 * 72), 0);
-    fs::write(sample.join("Trousers.pc16"), simulation).unwrap();
     let settings = Cloth3dSettings {
         binding: BindingSettings { smooth: false, ..BindingSettings::default() },
         thinning: Thinning { frame_rate: 30.0, static_threshold: 0.0 },
-        caches: true,
         ..Cloth3dSettings::default()
     };
     // A sample travels as one blob: the number of the damaged file, then its bytes.

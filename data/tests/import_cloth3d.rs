@@ -4,7 +4,7 @@ mod fixture;
 
 use clothcombo_data::asset::{BindingSettings, Body, BodyFileSettings, Category, Motion};
 use clothcombo_data::folders::load_garment_folder;
-use clothcombo_data::format::{MatFile, MatValue, NpzFile, PointCache};
+use clothcombo_data::format::{MatFile, MatValue, NpzFile};
 use clothcombo_data::import::{
     Cloth3dBodies, Cloth3dSettings, ImportError, Summary, Thinning, import_cloth3d,
 };
@@ -22,7 +22,6 @@ fn import(inputs: &[PathBuf], female: &Body, out: &Path, smooth: bool) -> Result
     let settings = Cloth3dSettings {
         binding: BindingSettings { smooth, ..BindingSettings::default() },
         thinning: Thinning { frame_rate: 30.0, static_threshold: 0.0 },
-        caches: true,
         ..Cloth3dSettings::default()
     };
     import_cloth3d(inputs, &bodies, out, &settings, &mut no_progress())
@@ -37,43 +36,27 @@ fn deviation(positions: &[[f64; 3]], garment: &str) -> f64 {
 }
 
 #[test]
-fn garments_come_to_the_zero_body_and_everything_else_is_kept() {
+fn garments_come_to_the_zero_body_and_poses_become_motions() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     let summary = import(&[fixture("cloth3d")], &body("body_female"), out, false).unwrap();
     let garments = load_garment_folder(&out.join("garments"), &body("body_neutral")).unwrap();
-    let names: Vec<&str> = garments.iter().map(|g| g.garment.name.as_str()).collect();
+    let names: Vec<&str> = garments.iter().map(|g| g.name.as_str()).collect();
     assert_eq!(names, ["00001_Top", "00001_Trousers", "00002_Trousers"]);
     for g in &garments {
-        let name = g.garment.name.split('_').nth(1).unwrap();
+        let name = g.name.split('_').nth(1).unwrap();
         // A vertex lies on a body vertex, so that what remains is the text's 0.1 µm and single precision.
-        let deviation = deviation(g.garment.rest.positions(), name);
-        assert!(deviation < 2e-6, "{}: {deviation:e}", g.garment.name);
-        assert!(g.garment.source.licence.contains("non-commercial"));
-        assert_eq!(g.garment.category == Category::Trousers, name == "Trousers");
+        let deviation = deviation(g.rest.positions(), name);
+        assert!(deviation < 2e-6, "{}: {deviation:e}", g.name);
+        assert!(g.source.licence.contains("non-commercial"));
+        assert_eq!(g.category == Category::Trousers, name == "Trousers");
     }
     // Quads and triangles of the file give the same surface.
-    assert_eq!(garments[1].garment.rest.face_count(), 2 * 4 * 6 * 3);
+    assert_eq!(garments[1].rest.face_count(), 2 * 4 * 6 * 3);
 
-    let manifest = fs::read_to_string(out.join("cloth3d.toml")).unwrap();
-    for line in [
-        "name = \"00001\"",
-        "gender = \"female\"",
-        "gender = \"male\"",
-        "fabric = \"silk\"",
-        "fabric = \"denim\"",
-        "tightness = [-0.5, 1.25]",
-        "zrot = -2.1",
-        "simulated_frames = 6",
-        "sequence = \"sequences/00001_Top.npz\"",
-    ] {
-        assert!(manifest.contains(line), "{line}: {manifest}");
-    }
     for (file, reason) in [
         ("Dress.obj", "No such file"),
         ("00002/Top.obj", "Top.obj:2: 'zero' is not a number"),
-        ("00001/Trousers.pc16", "5 points, but the garment has 96 vertices"),
-        ("00002/Trousers.pc16", "600 bytes"),
         ("00003_truncated", "info.mat"),
         ("00004_text", "not a MAT-5 file"),
         ("00005_gender", "gender is 7"),
@@ -87,13 +70,17 @@ fn garments_come_to_the_zero_body_and_everything_else_is_kept() {
             "{file}: {summary:#?}"
         );
     }
-    assert_eq!(summary.skipped.len(), 11, "{summary:#?}");
+    assert_eq!(summary.skipped.len(), 9, "{summary:#?}");
+    assert!(summary.taken.iter().any(|(name, about)| name == "00001_Top" && about.contains("silk")));
+    assert!(
+        summary.taken.iter().any(|(name, about)| name == "motion 00001" && about.starts_with("female, "))
+    );
     assert!(
         summary.notes.iter().any(|n| n.contains("male samples were unposed with the target body itself"))
     );
 
     // The poses, y up: the first three numbers are the root's, which only carried the turn to z up.
-    assert_eq!(files_in(&out.join("motions")), ["00001.npz", "00002.npz", "motions.toml"]);
+    assert_eq!(files_in(&out.join("motions")), ["00001.npz", "00002.npz"]);
     let motion = Motion::load(&out.join("motions/00001.npz")).unwrap();
     let poses = NpzFile::open(&fixture("expected_cloth3d.npz")).unwrap().numbers("poses_z_up", "").unwrap();
     assert_eq!((motion.poses.len(), poses.shape[0], motion.frame_rate), (6, 6, 30.0));
@@ -108,16 +95,6 @@ fn garments_come_to_the_zero_body_and_everything_else_is_kept() {
         );
     }
     assert_eq!(Motion::load(&out.join("motions/00002.npz")).unwrap().poses.len(), 1);
-
-    // The simulation, exact, with the axes exchanged.
-    let sequence =
-        NpzFile::open(&out.join("sequences/00001_Top.npz")).unwrap().numbers("positions", "").unwrap();
-    let z_up =
-        NpzFile::open(&fixture("expected_cloth3d.npz")).unwrap().numbers("Top_simulated_z_up", "").unwrap();
-    assert_eq!(sequence.shape, z_up.shape);
-    for (a, b) in sequence.data.chunks_exact(3).zip(z_up.data.chunks_exact(3)) {
-        assert_eq!(a, [b[0], b[2], -b[1]]);
-    }
 }
 
 #[test]
@@ -128,9 +105,7 @@ fn smoothed_weights_stay_near_and_the_wrong_body_does_not() {
         let out = tempfile::tempdir_in(folder.path()).unwrap();
         import(&sample, female, out.path(), smooth).unwrap();
         let garments = load_garment_folder(&out.path().join("garments"), female).unwrap();
-        let each = garments
-            .iter()
-            .map(|g| deviation(g.garment.rest.positions(), g.garment.name.split('_').nth(1).unwrap()));
+        let each = garments.iter().map(|g| deviation(g.rest.positions(), g.name.split('_').nth(1).unwrap()));
         each.fold(0.0, f64::max)
     };
     assert!(worst(&body("body_female"), true) < 0.03);
@@ -237,39 +212,5 @@ fn damaged_mat_files_are_refused_or_read_but_never_crash() {
                 assert!(e.to_string().contains(path.file_name().unwrap().to_str().unwrap()));
             }
         }
-    }
-}
-
-#[test]
-fn point_caches_are_exact_and_their_size_is_checked() {
-    let path = fixture("cloth3d/00001/Top.pc16");
-    let cache = PointCache::load(&path).unwrap();
-    let expected =
-        NpzFile::open(&fixture("expected_cloth3d.npz")).unwrap().numbers("Top_simulated_z_up", "").unwrap();
-    assert_eq!([cache.frame_count(), cache.point_count, 3], expected.shape[..]);
-    assert!(cache.positions.as_flattened().iter().zip(&expected.data).all(|(a, b)| f64::from(*a) == *b));
-    for cut in truncations(&path, 50) {
-        let message = PointCache::load(&cut.path).unwrap_err().to_string();
-        assert!(
-            message.contains("Top.pc16") && message.contains(&format!("{} bytes", cut.length)),
-            "{message}"
-        );
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let damaged = folder.path().join("x.pc16");
-    let whole = fs::read(&path).unwrap();
-    for (at, bytes, part) in [
-        (0, &b"POINTCACHE3\0"[..], "not a point cache"),
-        (12, &[2, 0, 0, 0][..], "version is 2"),
-        (16, &[0xff; 4][..], "-1 points"),
-        (16, &[0xff, 0xff, 0xff, 0x7f][..], "2147483647 points"),
-        (28, &[0; 4][..], "0 frames"),
-        (32 + 6 * 3, &[0, 0x7c][..], "frame 0, point 3 is not finite"),
-    ] {
-        let mut bad = whole.clone();
-        bad[at..at + bytes.len()].copy_from_slice(bytes);
-        fs::write(&damaged, &bad).unwrap();
-        let message = PointCache::load(&damaged).unwrap_err().to_string();
-        assert!(message.contains("x.pc16") && message.contains(part), "{message}");
     }
 }

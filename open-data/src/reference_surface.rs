@@ -1,7 +1,6 @@
 //! A fixed triangle sheet to which a remeshed copy keeps: its surface, its boundary curves and their corners.
 
-use clothcombo_data::mesh::LabelledTriangles;
-use clothcombo_data::mesh::RemeshTarget;
+use clothcombo_data::mesh::{LabelledTriangles, RemeshTarget};
 use clothcombo_physics::query::ClosestPoint;
 use clothcombo_physics::vec3::{add, dot, norm_squared, scale, sub};
 use std::collections::HashMap;

@@ -1,11 +1,12 @@
 //! Polygon soup of a game asset → one oriented manifold sheet, or the reason why not.
 
 use super::reference_surface::boundary_edges;
-use clothcombo_data::mesh::LabelledTriangles;
-use clothcombo_data::mesh::{SplitMesh, clean_faces, join_faces, orient, outwardness, split_fans, weld};
+use clothcombo_data::mesh::{
+    LabelledTriangles, SplitMesh, clean_faces, join_faces, orient, outwardness, split_fans, weld,
+};
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::{add, norm, scale, sub};
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 
 /// Vertices closer than this are one (m).
 const WELD_DISTANCE: f64 = 1e-4;
@@ -50,13 +51,10 @@ pub(super) fn repair(
     sheet = outermost_piece(sheet, &mut repairs)?;
     turn_outward(&mut sheet, body);
     if boundary_edges(&sheet.faces).is_empty() {
-        open_shell(&mut sheet, body, &mut repairs)?;
+        return Err("closed shell without an opening".into());
     }
     peel_lining(&mut sheet, body, &mut repairs)?;
     fill_small_holes(&mut sheet, &mut repairs);
-    if boundary_edges(&sheet.faces).is_empty() {
-        return Err("closed shell without an opening".into());
-    }
     Ok((sheet, repairs))
 }
 
@@ -94,27 +92,6 @@ fn turn_outward(sheet: &mut LabelledTriangles, body: &Surface<f64>) {
     }
 }
 
-/// A closed thick garment: keeps the outside only.
-fn open_shell(
-    sheet: &mut LabelledTriangles,
-    body: &Surface<f64>,
-    repairs: &mut Repairs,
-) -> Result<(), String> {
-    let facing = outwardness(&sheet.positions, &sheet.faces, body);
-    let total = sheet.area();
-    let faces = sheet.faces.iter().zip(&facing).filter(|(_, (d, _))| *d > 0.0).map(|(f, _)| *f).collect();
-    let outside =
-        LabelledTriangles { positions: sheet.positions.clone(), labels: sheet.labels.clone(), faces };
-    let outside = outside.largest_component();
-    let share = outside.area() / total;
-    if !(0.3..0.75).contains(&share) {
-        return Err(format!("closed shell whose outside ({:.0} % of it) is no sheet", 100.0 * share));
-    }
-    repairs.push(format!("took the outer layer of a closed shell ({:.0} % of its area)", 100.0 * share));
-    *sheet = outside;
-    Ok(())
-}
-
 /// Removes faces that look at the body and hang on the rim through such faces: hems folded inwards and linings.
 fn peel_lining(
     sheet: &mut LabelledTriangles,
@@ -123,31 +100,13 @@ fn peel_lining(
 ) -> Result<(), String> {
     let facing = outwardness(&sheet.positions, &sheet.faces, body);
     let total: f64 = facing.iter().map(|(_, a)| a).sum();
-    let mut of_edge: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
-    for (f, face) in sheet.faces.iter().enumerate() {
-        for i in 0..3 {
-            let (a, b) = (face[i], face[(i + 1) % 3]);
-            of_edge.entry([a.min(b), a.max(b)]).or_default().push(f as u32);
-        }
-    }
-    let inward = |f: u32| facing[f as usize].0 < -0.15;
+    // At the rim, or beside a face that is gone.
+    let (joined, _) = join_faces(&sheet.positions, &sheet.faces);
     let mut gone = vec![false; sheet.faces.len()];
-    let mut queue: VecDeque<u32> = boundary_edges(&sheet.faces)
-        .iter()
-        .filter_map(|[a, b]| of_edge.get(&[*a.min(b), *a.max(b)])?.first().copied())
-        .filter(|f| inward(*f))
-        .collect();
-    queue.iter().for_each(|f| gone[*f as usize] = true);
-    while let Some(f) = queue.pop_front() {
-        let face = sheet.faces[f as usize];
-        for i in 0..3 {
-            let (a, b) = (face[i], face[(i + 1) % 3]);
-            for g in of_edge.get(&[a.min(b), a.max(b)]).into_iter().flatten() {
-                if !gone[*g as usize] && inward(*g) {
-                    gone[*g as usize] = true;
-                    queue.push_back(*g);
-                }
-            }
+    let mut stack: Vec<usize> = (0..joined.len()).filter(|f| joined[*f].contains(&None)).collect();
+    while let Some(f) = stack.pop() {
+        if facing[f].0 < -0.15 && !std::mem::replace(&mut gone[f], true) {
+            stack.extend(joined[f].iter().flatten().map(|g| *g as usize));
         }
     }
     let area: f64 = gone.iter().zip(&facing).filter(|(g, _)| **g).map(|(_, (_, a))| a).sum();
@@ -157,11 +116,10 @@ fn peel_lining(
     if area > 0.55 * total {
         return Err(format!("{:.0} % of its area faces the body", 100.0 * area / total));
     }
-    let faces = sheet.faces.iter().zip(&gone).filter(|(_, g)| !**g).map(|(f, _)| *f).collect();
-    let rest = LabelledTriangles { positions: sheet.positions.clone(), labels: sheet.labels.clone(), faces };
+    let faces: Vec<[u32; 3]> = sheet.faces.iter().zip(&gone).filter(|(_, g)| !**g).map(|(f, _)| *f).collect();
     // Removing faces may leave vertices that two fans share.
-    let (joined, _) = join_faces(&rest.positions, &rest.faces);
-    *sheet = unlabelled(split_fans(&rest.positions, &rest.faces, &joined)).largest_component();
+    let (joined, _) = join_faces(&sheet.positions, &faces);
+    *sheet = unlabelled(split_fans(&sheet.positions, &faces, &joined)).largest_component();
     repairs.push(format!(
         "removed {:.0} % of the area that was folded to the inside",
         100.0 * (1.0 - sheet.area() / total)

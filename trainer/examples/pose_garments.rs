@@ -90,7 +90,7 @@ fn run(arguments: &Arguments) -> Result<(), Report> {
 fn named_garments(config: &Config, body: &Body, names: &[String]) -> Result<Vec<Garment>, Report> {
     let mut all = Vec::new();
     for folder in config.data.garments.iter().filter_map(|source| source.folder.as_ref()) {
-        all.extend(load_garment_folder(folder, body).into_diagnostic()?.into_iter().map(|g| g.garment));
+        all.extend(load_garment_folder(folder, body).into_diagnostic()?);
     }
     let find = |name: &String| {
         let known = || all.iter().map(|g| g.name.as_str()).collect::<Vec<_>>().join(", ");

@@ -55,9 +55,8 @@ impl Binding {
         let columns = used.len() + shape_width;
         let mut values = vec![0.0f32; nearest.len() * columns];
         for (row, v) in values.chunks_exact_mut(columns.max(1)).zip(&nearest) {
-            let (row_joints, weights) = body.skin_weights.row(*v);
-            for (j, w) in row_joints.iter().zip(weights) {
-                row[column_of[usize::from(*j)]] += w;
+            for (j, w) in body.skin_weights.of_vertex(*v) {
+                row[column_of[j]] += w;
             }
             row[used.len()..].copy_from_slice(&body.shape_directions[v * width..v * width + shape_width]);
         }
@@ -137,14 +136,8 @@ pub(super) fn nearest_body_vertices(garment: &Garment, body: &Body, own_leg: boo
     let crotch_side = |leg: usize| {
         let names: Vec<usize> = LEG_JOINTS[leg].iter().filter_map(|n| body.joint(n)).collect();
         let of_leg = |v: &usize| {
-            let (joints, weights) = body.skin_weights.row(*v);
-            let share: f32 = joints
-                .iter()
-                .zip(weights)
-                .filter(|(j, _)| names.contains(&usize::from(**j)))
-                .map(|(_, w)| w)
-                .sum();
-            share > 0.5
+            let of_leg = body.skin_weights.of_vertex(*v).filter(|(j, _)| names.contains(j));
+            of_leg.map(|(_, w)| w).sum::<f32>() > 0.5
         };
         (0..body.vertex_count()).filter(of_leg).collect::<Vec<usize>>()
     };

@@ -8,6 +8,7 @@ use super::pose::Pose;
 use super::rotation::{self, Matrix3, matrix_from_axis_angle};
 use super::skin_weights::SparseSkinWeights;
 use clothcombo_physics::mesh::{Topology, TriMesh};
+use clothcombo_physics::transform;
 use clothcombo_physics::vec3::{add, sub};
 use rayon::prelude::*;
 use std::ops::{Deref, DerefMut};
@@ -17,12 +18,12 @@ use thiserror::Error;
 mod joints;
 mod skinning;
 
-pub use skinning::{skin, transform, unskin};
+pub use skinning::{skin, unskin};
 
-/// Why a body cannot be made or posed: its name, and the array, joint or vertex that is wrong.
+/// Why a body cannot be made, posed or recovered: its name, and the array, joint or vertex that is wrong.
 #[derive(Debug, Error)]
 #[error("{0}")]
-pub struct BodyError(String);
+pub struct BodyError(pub(super) String);
 
 /// Everything a body is made of: V vertices, J joints, K shape components.
 #[derive(Clone, Debug)]
@@ -124,22 +125,18 @@ impl Body {
         if let Some(p) = &parts.pose_directions {
             check("the pose directions", "[V, 3, 9(J-1)]", p.len(), vertices * 27 * (joints - 1))?;
         }
-        let finite = |part, position: Option<usize>| match position {
-            Some(index) => Err(wrong(format!("{part} holds a non-finite number at position {index}"))),
-            None => Ok(()),
-        };
-        finite("the template", parts.template.as_flattened().iter().position(|x| !x.is_finite()))?;
-        finite(
-            "the joint template",
-            parts.joint_template.as_flattened().iter().position(|x| !x.is_finite()),
-        )?;
-        finite("the shape directions", parts.shape_directions.iter().position(|x| !x.is_finite()))?;
-        finite(
-            "the joint shape directions",
-            parts.joint_shape_directions.iter().position(|x| !x.is_finite()),
-        )?;
-        if let Some(p) = &parts.pose_directions {
-            finite("the pose directions", p.iter().position(|x| !x.is_finite()))?;
+        let in_f64 = |numbers: &[f64]| numbers.iter().position(|x| !x.is_finite());
+        let in_f32 = |numbers: &[f32]| numbers.iter().position(|x| !x.is_finite());
+        for (part, position) in [
+            ("the template", in_f64(parts.template.as_flattened())),
+            ("the joint template", in_f64(parts.joint_template.as_flattened())),
+            ("the shape directions", in_f32(&parts.shape_directions)),
+            ("the joint shape directions", in_f64(&parts.joint_shape_directions)),
+            ("the pose directions", parts.pose_directions.as_deref().and_then(in_f32)),
+        ] {
+            if let Some(index) = position {
+                return Err(wrong(format!("{part} holds a non-finite number at position {index}")));
+            }
         }
         for (joint, parent) in parts.parents.iter().enumerate() {
             if (joint == 0) != parent.is_none() || parent.is_some_and(|p| p >= joint) {
@@ -220,12 +217,9 @@ impl Body {
     pub fn with_shape_components(mut self, count: usize) -> Self {
         let k = self.shape_count;
         if count < k {
-            self.shape_directions =
-                self.shape_directions.chunks_exact(k).flat_map(|row| &row[..count]).copied().collect();
-            self.joint_shape_directions =
-                self.joint_shape_directions.chunks_exact(k).flat_map(|row| &row[..count]).copied().collect();
-            let pelvis = &mut self.file_pelvis.shape_directions;
-            *pelvis = pelvis.chunks_exact(k).flat_map(|row| &row[..count]).copied().collect();
+            self.shape_directions = first_columns(&self.shape_directions, k, count);
+            self.joint_shape_directions = first_columns(&self.joint_shape_directions, k, count);
+            self.file_pelvis.shape_directions = first_columns(&self.file_pelvis.shape_directions, k, count);
             self.shape_count = count;
         }
         self
@@ -303,15 +297,7 @@ impl Body {
                 }
             }
         }
-        (0..joints.len())
-            .map(|j| {
-                let moved = rotation::apply(&rotations[j], joints[j]);
-                std::array::from_fn(|a| {
-                    let r = rotations[j][a];
-                    [r[0], r[1], r[2], places[j][a] - moved[a]]
-                })
-            })
-            .collect()
+        (0..joints.len()).map(|j| rotation::rigid_motion(&rotations[j], joints[j], places[j])).collect()
     }
 
     /// The body of shape `beta` in `pose`: shape, pose correctives, linear blend skinning.
@@ -334,14 +320,11 @@ impl Body {
             .into_par_iter()
             .with_min_len(1024)
             .map(|v| {
-                let (row_joints, weights) = self.skin_weights.row(v);
-                skin(
-                    positions[v],
-                    row_joints.iter().zip(weights).map(|(j, w)| (&bones[usize::from(*j)], f64::from(*w))),
-                )
+                let weights = self.skin_weights.of_vertex(v);
+                skin(positions[v], weights.map(|(j, w)| (&bones[j], f64::from(w))))
             })
             .collect();
-        let joints = joints.iter().zip(&bones).map(|(p, b)| transform(b, *p)).collect();
+        let joints = joints.iter().zip(&bones).map(|(p, b)| transform::apply(b, *p)).collect();
         Ok(PosedBody { positions, bones, joints })
     }
 
@@ -395,6 +378,14 @@ impl Body {
         }
         collars.iter().sum::<f64>() / collars.len() as f64
     }
+}
+
+/// The first `keep` of so many `columns` of a row-major array.
+pub(super) fn first_columns<T: Copy>(data: &[T], columns: usize, keep: usize) -> Vec<T> {
+    if columns == 0 {
+        return Vec::new();
+    }
+    data.chunks_exact(columns).flat_map(|row| row[..keep].iter().copied()).collect()
 }
 
 #[cfg(test)]

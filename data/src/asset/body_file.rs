@@ -5,7 +5,7 @@
 //! the same keys with `J_template` and `J_shapedirs`, plus `source`, `author` and `licence`, and `pelvis_template` with
 //! `pelvis_shapedirs`: where the pelvis was in the file the body came from, if that was not the origin.
 
-use super::body::{Body, BodyParts, FilePelvis};
+use super::body::{Body, BodyParts, FilePelvis, first_columns};
 use super::provenance::Provenance;
 use super::skeleton::{self, BODY_JOINT_NAMES};
 use super::skin_weights::SparseSkinWeights;
@@ -26,7 +26,7 @@ impl Default for BodyFileSettings {
     }
 }
 
-const HINT: &str = "a body is an SMPL, SMPL-H or SMPL-X npz with v_template, f, shapedirs, weights, kintree_table and J_regressor";
+const BODY_HINT: &str = "a body is an SMPL, SMPL-H or SMPL-X npz with v_template, f, shapedirs, weights, kintree_table and J_regressor";
 
 /// Warning about a body whose faces look inwards.
 pub(crate) const INSIDE_OUT: &str = "the body is inside out; its faces were turned";
@@ -84,7 +84,7 @@ impl Body {
         let (components, directions) = match file.contains("shapedirs") {
             false => (0, Vec::new()),
             true => {
-                let directions = file.numbers_f32("shapedirs", HINT)?;
+                let directions = file.numbers_f32("shapedirs", BODY_HINT)?;
                 match directions.shape[..] {
                     [v, 3, k] if v == vertices => (k, directions.data),
                     _ => {
@@ -98,42 +98,29 @@ impl Body {
         let shape_count = shape_part(joints, components, ours).min(settings.shape_components);
         let shape_directions = first_columns(&directions, components, shape_count);
 
-        let weights = file.numbers_f32("weights", HINT)?;
-        if weights.shape != [vertices, joints] {
-            return Err(file.wrong_shape("weights", &weights.shape, &format!("[{vertices}, {joints}]")));
-        }
+        let weights = file.numbers_f32("weights", BODY_HINT)?;
+        let weights = file.of_shape("weights", weights, &[vertices, joints])?;
         let (joint_template, joint_shape_directions) = if file.contains("J_template") {
             let joint_template = points(&mut file, "J_template")?;
             if joint_template.len() != joints {
                 let found = [joint_template.len(), 3];
                 return Err(file.wrong_shape("J_template", &found, &format!("[{joints}, 3]")));
             }
-            let d = match components == 0 && !ours {
+            let directions = match components == 0 && !ours {
                 true => Array { shape: vec![joints, 3, 0], data: Vec::new() },
                 false => file.numbers("J_shapedirs", "J_template goes with J_shapedirs")?,
             };
-            if d.shape != [joints, 3, components] {
-                return Err(file.wrong_shape(
-                    "J_shapedirs",
-                    &d.shape,
-                    &format!("[{joints}, 3, {components}]"),
-                ));
-            }
-            (joint_template, first_columns(&d.data, components, shape_count))
+            let directions = file.of_shape("J_shapedirs", directions, &[joints, 3, components])?;
+            (joint_template, first_columns(&directions, components, shape_count))
         } else {
-            let r = file.numbers("J_regressor", HINT)?;
-            if r.shape != [joints, vertices] {
-                return Err(file.wrong_shape("J_regressor", &r.shape, &format!("[{joints}, {vertices}]")));
-            }
-            regress_joints(&r.data, &template, &shape_directions, shape_count)
+            let regressor = file.numbers("J_regressor", BODY_HINT)?;
+            let regressor = file.of_shape("J_regressor", regressor, &[joints, vertices])?;
+            regress_joints(&regressor, &template, &shape_directions, shape_count)
         };
         let pose_directions = if file.contains("posedirs") {
-            let p = file.numbers_f32("posedirs", HINT)?;
-            let expected = [vertices, 3, 9 * (joints - 1)];
-            if p.shape != expected {
-                return Err(file.wrong_shape("posedirs", &p.shape, &format!("{expected:?}")));
-            }
-            p.data.iter().any(|x| *x != 0.0).then_some(p.data)
+            let directions = file.numbers_f32("posedirs", BODY_HINT)?;
+            let directions = file.of_shape("posedirs", directions, &[vertices, 3, 9 * (joints - 1)])?;
+            directions.iter().any(|x| *x != 0.0).then_some(directions)
         } else {
             None
         };
@@ -158,7 +145,7 @@ impl Body {
             joint_template,
             joint_shape_directions,
             pose_directions,
-            skin_weights: SparseSkinWeights::from_dense(&weights.data, joints),
+            skin_weights: SparseSkinWeights::from_dense(&weights, joints),
             parents,
             joint_names,
         })
@@ -208,25 +195,23 @@ fn recorded_pelvis(
     if !file.contains("pelvis_template") {
         return Ok(None);
     }
-    let template = file.numbers("pelvis_template", HINT)?;
+    let template = file.numbers("pelvis_template", BODY_HINT)?;
     let [x, y, z] = template.data[..] else {
         return Err(file.wrong_shape("pelvis_template", &template.shape, "[3]"));
     };
     let directions = file.numbers("pelvis_shapedirs", "pelvis_template goes with pelvis_shapedirs")?;
-    if directions.shape != [3, components] {
-        return Err(file.wrong_shape("pelvis_shapedirs", &directions.shape, &format!("[3, {components}]")));
-    }
-    if let Some(x) = template.data.iter().chain(&directions.data).find(|x| !x.is_finite()) {
+    let directions = file.of_shape("pelvis_shapedirs", directions, &[3, components])?;
+    if let Some(x) = template.data.iter().chain(&directions).find(|x| !x.is_finite()) {
         let message =
             format!("keys 'pelvis_template' and 'pelvis_shapedirs' hold {x}; write finite numbers (m)");
         return Err(FileError::content(file.path())(message));
     }
-    let shape_directions = first_columns(&directions.data, components, shape_count);
+    let shape_directions = first_columns(&directions, components, shape_count);
     Ok(Some(FilePelvis { template: [x, y, z], shape_directions }))
 }
 
 fn points(file: &mut NpzFile, key: &str) -> Result<Vec<[f64; 3]>, FileError> {
-    let array = file.numbers(key, HINT)?;
+    let array = file.numbers(key, BODY_HINT)?;
     match array.shape[..] {
         [n, 3] if n > 0 => Ok(array.data.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()),
         _ => Err(file.wrong_shape(key, &array.shape, "[n, 3], n >= 1")),
@@ -234,7 +219,7 @@ fn points(file: &mut NpzFile, key: &str) -> Result<Vec<[f64; 3]>, FileError> {
 }
 
 fn faces(file: &mut NpzFile, vertices: usize) -> Result<Vec<[u32; 3]>, FileError> {
-    let array = file.numbers("f", HINT)?;
+    let array = file.numbers("f", BODY_HINT)?;
     if !matches!(array.shape[..], [_, 3]) {
         return Err(file.wrong_shape("f", &array.shape, "[faces, 3]"));
     }
@@ -261,7 +246,7 @@ fn fraction(file: &NpzFile, key: &str, place: &str, value: f64) -> FileError {
 /// The parent of each joint, from the first row of the table. The root's is −1, or 2³² − 1 where the table is unsigned; anything
 /// that is no joint is "none".
 fn parents(file: &mut NpzFile) -> Result<Vec<Option<usize>>, FileError> {
-    let tree = file.numbers("kintree_table", HINT)?;
+    let tree = file.numbers("kintree_table", BODY_HINT)?;
     let joints = match tree.shape[..] {
         [2, joints] if joints > 0 => joints,
         _ => return Err(file.wrong_shape("kintree_table", &tree.shape, "[2, joints]")),
@@ -275,13 +260,6 @@ fn parents(file: &mut NpzFile) -> Result<Vec<Option<usize>>, FileError> {
     Ok((parents.iter().enumerate())
         .map(|(joint, p)| (joint > 0 && is_joint(*p)).then_some(*p as usize))
         .collect())
-}
-
-fn first_columns<T: Copy>(data: &[T], columns: usize, keep: usize) -> Vec<T> {
-    if columns == 0 {
-        return Vec::new();
-    }
-    data.chunks_exact(columns).flat_map(|row| row[..keep].iter().copied()).collect()
 }
 
 /// Joints are linear in the vertices, hence in the shape: `J_reg · (T + S·β)`.

@@ -13,7 +13,7 @@ const FADE: usize = 10;
 
 /// Body farther from the garment than this (m) is not below it, however it faces it: the legs in a wide skirt are up to 13 cm
 /// away.
-const FARTHEST: f64 = 0.15;
+const FARTHEST_COVERED: f64 = 0.15;
 
 /// Where a garment lies on the zero body.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +36,7 @@ impl Footprint {
         hems.iter().flatten().for_each(|v| on_hem[*v as usize] = true);
         let surface = ClosestPoint::new(positions.to_vec(), faces);
         let is_covered = |p: &[f64; 3]| {
-            let Some(found) = surface.project_within(*p, FARTHEST) else { return false };
+            let Some(found) = surface.project_within(*p, FARTHEST_COVERED) else { return false };
             let corners = faces[found.face as usize];
             match found.feature {
                 Feature::Face => true,

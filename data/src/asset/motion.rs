@@ -48,9 +48,6 @@ pub struct Motion {
     pub source: Provenance,
 }
 
-const HINT: &str =
-    "a motion has poses (frames, 66 or more) and mocap_framerate, or the keys of another SMPL tool";
-
 impl Motion {
     /// Reads a motion npz, in any of the layouts of [`MotionFile`]. Of more than 22 joints those of the body are kept: those that
     /// `joint_names` says, or else the first.

@@ -6,20 +6,21 @@
 //! of a covariance is taken by the iteration of Müller, Bender, Chentanez and Macklin, "A robust method to extract the
 //! rotational part of deformations" (MIG 2016).
 
-use super::body::{Body, BodyError, transform};
+use super::body::{Body, BodyError};
+use super::normal_equations::NormalEquations;
 use super::pose::Pose;
-use super::rotation::{Matrix3, apply, axis_angle_from_matrix, matrix_from_axis_angle, product, transpose};
+use super::rotation::{
+    Matrix3, axis_angle_from_matrix, matrix_from_axis_angle, product, rigid_motion, transpose,
+};
+use clothcombo_physics::transform::{self, Transform};
 use clothcombo_physics::vec3::{add, add_scaled, cross, dot, norm, scale, sub};
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
-use thiserror::Error;
 
 /// A mesh whose vertices are farther from the recovered body than this on average is no pose of it (m).
-const FARTHEST: f64 = 0.03;
+const LARGEST_MEAN_DISTANCE: f64 = 0.03;
 /// Rounds over all bones.
-const ROUNDS: usize = 30;
+const BONE_ROUNDS: usize = 30;
 /// Rounds of pose and shape where the shape is not known.
-const SHAPE_ROUNDS: usize = 6;
+const POSED_SHAPE_ROUNDS: usize = 6;
 /// Bones have no say on vertices they carry less of than this.
 const LEAST_WEIGHT: f64 = 0.05;
 /// Weight of small shape numbers against close vertices (m²): decides only what the vertices leave open.
@@ -38,33 +39,6 @@ pub struct RecoveredBody {
     pub mean_distance: f64,
 }
 
-/// Why no body is recovered: the mesh or the body that does not fit.
-#[derive(Debug, Error)]
-#[error("{0}")]
-pub struct RecoverError(String);
-
-impl From<BodyError> for RecoverError {
-    fn from(e: BodyError) -> Self {
-        Self(e.to_string())
-    }
-}
-
-/// A rigid motion.
-#[derive(Clone, Copy)]
-struct Bone {
-    rotation: Matrix3,
-    translation: [f64; 3],
-}
-
-impl Bone {
-    fn rows(&self) -> [[f64; 4]; 3] {
-        std::array::from_fn(|a| {
-            let [x, y, z] = self.rotation[a];
-            [x, y, z, self.translation[a]]
-        })
-    }
-}
-
 /// What is known of the shape of a body.
 #[derive(Clone, Copy, Debug)]
 pub enum KnownShape<'a> {
@@ -79,12 +53,8 @@ pub enum KnownShape<'a> {
 /// Recovers shape and pose from `posed` `[V, 3]` (m).
 ///
 /// # Errors
-/// [`RecoverError`] if a mesh is not of this body's vertices, or no pose of the body.
-pub fn recover_body(
-    body: &Body,
-    known: KnownShape,
-    posed: &[[f64; 3]],
-) -> Result<RecoveredBody, RecoverError> {
+/// [`BodyError`] if a mesh is not of this body's vertices, or no pose of the body.
+pub fn recover_body(body: &Body, known: KnownShape, posed: &[[f64; 3]]) -> Result<RecoveredBody, BodyError> {
     check(body, "posed", posed)?;
     let shape = match known {
         KnownShape::TPose(rest) => {
@@ -101,9 +71,9 @@ pub fn recover_body(
     let place = scale(sum, 1.0 / count);
     let distances = posed.iter().zip(&model).map(|(p, m)| norm(sub(sub(*p, *m), place)));
     let mean_distance = distances.sum::<f64>() / count;
-    match mean_distance <= FARTHEST {
+    match mean_distance <= LARGEST_MEAN_DISTANCE {
         true => Ok(RecoveredBody { shape, pose, place, mean_distance }),
-        false => Err(RecoverError(format!(
+        false => Err(BodyError(format!(
             "no pose of body '{}' comes near it: the vertices stay {:.0} mm away on average",
             body.name,
             1e3 * mean_distance
@@ -111,16 +81,16 @@ pub fn recover_body(
     }
 }
 
-fn check(body: &Body, which: &str, positions: &[[f64; 3]]) -> Result<(), RecoverError> {
+fn check(body: &Body, which: &str, positions: &[[f64; 3]]) -> Result<(), BodyError> {
     let (found, expected) = (positions.len(), body.vertex_count());
     if found != expected {
         let body = &body.name;
-        return Err(RecoverError(format!(
+        return Err(BodyError(format!(
             "the {which} mesh has {found} vertices, body '{body}' has {expected}"
         )));
     }
     match positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-        Some(vertex) => Err(RecoverError(format!("vertex {vertex} of the {which} mesh is not finite"))),
+        Some(vertex) => Err(BodyError(format!("vertex {vertex} of the {which} mesh is not finite"))),
         None => Ok(()),
     }
 }
@@ -128,17 +98,21 @@ fn check(body: &Body, which: &str, positions: &[[f64; 3]]) -> Result<(), Recover
 fn fitted_pose(body: &Body, shape: &[f64], posed: &[[f64; 3]]) -> Result<Pose, BodyError> {
     let bones = fitted_bones(body, &body.shaped(shape)?.positions, posed);
     let local = |j: usize| match body.parents[j] {
-        Some(parent) => product(&transpose(&bones[parent].rotation), &bones[j].rotation),
-        None => bones[j].rotation,
+        Some(parent) => product(&transpose(&rotation(&bones[parent])), &rotation(&bones[j])),
+        None => rotation(&bones[j]),
     };
     Ok(Pose { rotations: (0..body.joint_count()).map(|j| axis_angle_from_matrix(&local(j))).collect() })
+}
+
+fn rotation(bone: &Transform) -> Matrix3 {
+    bone.map(|[x, y, z, _]| [x, y, z])
 }
 
 /// The shape of a posed mesh. For given rotations the posed vertices are linear in the shape: pose and shape are fitted in turns.
 fn shape_of_posed(body: &Body, posed: &[[f64; 3]]) -> Result<Vec<f64>, BodyError> {
     let k = body.shape_count;
     let mut shape = vec![0.0; k];
-    for _ in 0..if k == 0 { 0 } else { SHAPE_ROUNDS } {
+    for _ in 0..if k == 0 { 0 } else { POSED_SHAPE_ROUNDS } {
         let pose = fitted_pose(body, &shape, posed)?;
         let start = body.posed(&[], &pose)?.positions;
         let mut directions = vec![0f32; 3 * k * start.len()];
@@ -166,57 +140,42 @@ fn linear_shape(template: &[[f64; 3]], directions: &[f32], k: usize, rest: &[[f6
         return Vec::new();
     }
     // Unknowns: K shape numbers and a translation. Rows: coordinates.
-    let size = k + 3;
-    let mut gram = vec![vec![0.0; size]; size];
-    let mut right = vec![0.0; size];
-    let mut row = vec![0.0; size];
+    let mut equations = NormalEquations::new(k + 3);
+    let mut row = vec![0.0; k + 3];
     for (v, (p, t)) in rest.iter().zip(template).enumerate() {
         for a in 0..3 {
             let of_coordinate = &directions[(3 * v + a) * k..(3 * v + a + 1) * k];
             row[..k].iter_mut().zip(of_coordinate).for_each(|(r, d)| *r = f64::from(*d));
             (0..3).for_each(|b| row[k + b] = if a == b { 1.0 } else { 0.0 });
-            for i in 0..size {
-                right[i] += row[i] * (p[a] - t[a]);
-                for j in 0..=i {
-                    gram[i][j] += row[i] * row[j];
-                }
-            }
+            equations.add(&row, p[a] - t[a]);
         }
     }
-    for (i, line) in gram.iter_mut().enumerate() {
-        line[i] += RIDGE;
-    }
-    let gram = Mat::from_fn(size, size, |i, j| gram[i.max(j)][i.min(j)]);
-    let Ok(factor) = gram.llt(Side::Lower) else { return vec![0.0; k] };
-    let solution = factor.solve(Mat::from_fn(size, 1, |i, _| right[i]));
-    (0..k).map(|i| solution[(i, 0)]).collect()
+    let mut solution = equations.solution(|_| RIDGE).unwrap_or_else(|| vec![0.0; k]);
+    solution.truncate(k);
+    solution
 }
 
 /// Bones of linear blend skinning that carry `shaped` closest to `posed`.
-fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Bone> {
+fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Transform> {
     let mut vertices: Vec<Vec<(usize, f64)>> = vec![Vec::new(); body.joint_count()];
     for v in 0..shaped.len() {
-        let (joints, weights) = body.skin_weights.row(v);
-        for (j, w) in joints.iter().zip(weights).filter(|(_, w)| f64::from(**w) > LEAST_WEIGHT) {
-            vertices[usize::from(*j)].push((v, f64::from(*w)));
+        for (j, w) in body.skin_weights.of_vertex(v).filter(|(_, w)| f64::from(*w) > LEAST_WEIGHT) {
+            vertices[j].push((v, f64::from(w)));
         }
     }
-    let mut bones: Vec<Bone> = Vec::with_capacity(body.joint_count());
-    let unmoved =
-        Bone { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
+    let mut bones: Vec<Transform> = Vec::with_capacity(body.joint_count());
     for j in 0..body.joint_count() {
-        let parent = body.parents[j].map_or(unmoved, |p| bones[p]);
+        let parent = body.parents[j].map_or(transform::IDENTITY, |p| bones[p]);
         let mostly = vertices[j].iter().map(|&(v, w)| (shaped[v], posed[v], w.powi(4)));
         bones.push(closest_motion(mostly, &parent));
     }
     let mut skinned: Vec<[f64; 3]> = vec![[0.0; 3]; shaped.len()];
     for (v, s) in skinned.iter_mut().enumerate() {
-        let (joints, weights) = body.skin_weights.row(v);
-        for (j, w) in joints.iter().zip(weights) {
-            *s = add_scaled(*s, f64::from(*w), transform(&bones[usize::from(*j)].rows(), shaped[v]));
+        for (j, w) in body.skin_weights.of_vertex(v) {
+            *s = add_scaled(*s, f64::from(w), transform::apply(&bones[j], shaped[v]));
         }
     }
-    for _ in 0..ROUNDS {
+    for _ in 0..BONE_ROUNDS {
         for j in 0..bones.len() {
             if vertices[j].is_empty() {
                 // Nothing shows how it is turned: it goes with its parent.
@@ -225,15 +184,16 @@ fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Bon
                 }
                 continue;
             }
-            let old = bones[j].rows();
+            let old = bones[j];
             // What the other bones leave, as if this one carried the vertex alone.
             let wanted = vertices[j].iter().map(|&(v, w)| {
-                let own = transform(&old, shaped[v]);
+                let own = transform::apply(&old, shaped[v]);
                 (shaped[v], add_scaled(own, 1.0 / w, sub(posed[v], skinned[v])), w * w)
             });
-            let new = closest_motion(wanted, &bones[j]);
+            let new = closest_motion(wanted, &old);
             for &(v, w) in &vertices[j] {
-                let moved = sub(transform(&new.rows(), shaped[v]), transform(&old, shaped[v]));
+                let [now, before] = [new, old].map(|bone| transform::apply(&bone, shaped[v]));
+                let moved = sub(now, before);
                 skinned[v] = add_scaled(skinned[v], w, moved);
             }
             bones[j] = new;
@@ -243,7 +203,10 @@ fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Bon
 }
 
 /// The rigid motion that carries weighted (from, to) points closest; `start` without points.
-fn closest_motion(points: impl Iterator<Item = ([f64; 3], [f64; 3], f64)> + Clone, start: &Bone) -> Bone {
+fn closest_motion(
+    points: impl Iterator<Item = ([f64; 3], [f64; 3], f64)> + Clone,
+    start: &Transform,
+) -> Transform {
     let mut total = 0.0;
     let (mut from, mut to) = ([0.0; 3], [0.0; 3]);
     for (p, q, w) in points.clone() {
@@ -264,8 +227,7 @@ fn closest_motion(points: impl Iterator<Item = ([f64; 3], [f64; 3], f64)> + Clon
             }
         }
     }
-    let rotation = closest_rotation(&covariance, start.rotation);
-    Bone { rotation, translation: sub(to, apply(&rotation, from)) }
+    rigid_motion(&closest_rotation(&covariance, rotation(start)), from, to)
 }
 
 /// The rotation R with the largest tr(RᵀA), from a start.
@@ -297,7 +259,7 @@ mod tests {
     fn scene(seed: u64) -> (Body, Vec<f64>, Pose) {
         let body = mannequin();
         let shape = (0..body.shape_count).map(|k| if k % 2 == 0 { 1.2 } else { -0.7 }).collect();
-        let mut pose = PoseSampler::default().sample(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
+        let mut pose = PoseSampler.sample(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
         pose.rotations[0] = [0.2, 1.9, -0.1];
         (body, shape, pose)
     }

@@ -1,5 +1,8 @@
 //! Rotations as axis-angle vectors, unit quaternions `[w, x, y, z]` and 3×3 matrices (row-major, column vectors).
 
+use clothcombo_physics::transform::Transform;
+use clothcombo_physics::vec3::{cross, dot, norm, norm_squared};
+
 /// A 3×3 matrix, rows first.
 pub type Matrix3 = [[f64; 3]; 3];
 
@@ -103,34 +106,33 @@ pub fn apply(m: &Matrix3, v: [f64; 3]) -> [f64; 3] {
     m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
+/// The motion with this rotation that carries point `from` to point `to`.
+pub fn rigid_motion(rotation: &Matrix3, from: [f64; 3], to: [f64; 3]) -> Transform {
+    let turned = apply(rotation, from);
+    std::array::from_fn(|a| {
+        let [x, y, z] = rotation[a];
+        [x, y, z, to[a] - turned[a]]
+    })
+}
+
 /// The smallest rotation that turns direction `from` into direction `to`; the identity if either is zero.
 pub fn between(from: [f64; 3], to: [f64; 3]) -> Matrix3 {
-    let cross = [
-        from[1] * to[2] - from[2] * to[1],
-        from[2] * to[0] - from[0] * to[2],
-        from[0] * to[1] - from[1] * to[0],
-    ];
-    let dot = from[0] * to[0] + from[1] * to[1] + from[2] * to[2];
-    let length = (from.iter().map(|x| x * x).sum::<f64>() * to.iter().map(|x| x * x).sum::<f64>()).sqrt();
+    let across = cross(from, to);
+    let length = (norm_squared(from) * norm_squared(to)).sqrt();
     if length == 0.0 {
         return IDENTITY;
     }
-    let sine = cross.iter().map(|x| x * x).sum::<f64>().sqrt() / length;
-    let angle = sine.atan2(dot / length);
+    let sine = norm(across) / length;
+    let angle = sine.atan2(dot(from, to) / length);
     let axis = if sine > 1e-12 {
-        cross.map(|x| x / (sine * length))
+        across.map(|x| x / (sine * length))
     } else {
         // Opposite directions: any axis across `from` will do.
         let least = (0..3).fold(0, |best, i| if from[i].abs() < from[best].abs() { i } else { best });
         let mut e = [0.0; 3];
         e[least] = 1.0;
-        let a = [
-            from[1] * e[2] - from[2] * e[1],
-            from[2] * e[0] - from[0] * e[2],
-            from[0] * e[1] - from[1] * e[0],
-        ];
-        let n = a.iter().map(|x| x * x).sum::<f64>().sqrt();
-        a.map(|x| x / n)
+        let axis = cross(from, e);
+        axis.map(|x| x / norm(axis))
     };
     matrix_from_axis_angle(axis.map(|x| x * angle))
 }

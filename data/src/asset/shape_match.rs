@@ -4,22 +4,21 @@
 //! found whose surface lies closest to the other one, by iterated closest points with point-to-plane distances.
 
 use super::body::Body;
+use super::normal_equations::NormalEquations;
 use clothcombo_physics::Surface;
 use clothcombo_physics::vec3::{dot, sub};
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
 use std::sync::Arc;
 
 /// Rounds of closest points.
-const ROUNDS: usize = 8;
+const MATCH_ROUNDS: usize = 8;
 /// Vertices looked at.
-const SAMPLES: usize = 2000;
+const MATCHED_VERTICES: usize = 2000;
 /// Closest points that are farther away are on another part of the body (m).
-const REACH: f64 = 0.1;
-/// A distance (m) that counts as much, on average over the vertices, as a shape number of 1 does with [`PRIOR`].
-const TOLERANCE: f64 = 0.01;
+const MATCH_REACH: f64 = 0.1;
+/// A distance (m) that counts as much, on average over the vertices, as a shape number of 1 does with [`SHAPE_PRIOR`].
+const MATCH_TOLERANCE: f64 = 0.01;
 /// Weight of small shape numbers: decides only what the surface leaves open.
-const PRIOR: f64 = 0.02;
+const SHAPE_PRIOR: f64 = 0.02;
 
 /// A shape that looks like another body.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,29 +39,22 @@ pub fn match_shape(
 ) -> ShapeMatch {
     let target = Surface::new(positions, faces);
     let k = body.shape_count;
-    let step = body.vertex_count().div_ceil(SAMPLES).max(1);
+    let step = body.vertex_count().div_ceil(MATCHED_VERTICES).max(1);
     let mut shape = vec![0.0; k];
     let mut mean_distance = f64::INFINITY;
-    for round in 0..=ROUNDS {
-        let surface: Vec<[f64; 3]> = (0..body.vertex_count())
-            .step_by(step)
-            .map(|v| {
-                std::array::from_fn(|a| {
-                    let row = &body.shape_directions[(3 * v + a) * k..(3 * v + a + 1) * k];
-                    body.template[v][a] + row.iter().zip(&shape).map(|(d, b)| f64::from(*d) * b).sum::<f64>()
-                })
-            })
-            .collect();
+    for round in 0..=MATCH_ROUNDS {
+        // Never refused: there are as many numbers as the body has components.
+        let Ok(shaped) = body.shaped(&shape) else { break };
+        let surface: Vec<[f64; 3]> = shaped.positions.into_iter().step_by(step).collect();
         let closest: Vec<_> =
-            surface.iter().map(|p| target.closest_point().project_within(*p, REACH)).collect();
+            surface.iter().map(|p| target.closest_point().project_within(*p, MATCH_REACH)).collect();
         let distances =
-            closest.iter().map(|found| found.as_ref().map_or(REACH, |f| f.distance_squared.sqrt()));
+            closest.iter().map(|found| found.as_ref().map_or(MATCH_REACH, |f| f.distance_squared.sqrt()));
         mean_distance = distances.sum::<f64>() / surface.len().max(1) as f64;
-        if k == 0 || round == ROUNDS {
+        if k == 0 || round == MATCH_ROUNDS {
             break;
         }
-        let mut gram = vec![vec![0.0; k]; k];
-        let mut right = vec![0.0; k];
+        let mut equations = NormalEquations::new(k);
         let mut count = 0.0;
         for (sample, found) in closest.iter().enumerate() {
             let Some(found) = found else { continue };
@@ -75,18 +67,12 @@ pub fn match_shape(
                 })
                 .collect();
             // Where the plane would have the template: the shape is solved for anew in every round.
-            let wanted = dot(found.normal, sub(found.position, body.template[v]));
-            for i in 0..k {
-                right[i] += row[i] * wanted;
-                (0..=i).for_each(|j| gram[i][j] += row[i] * row[j]);
-            }
+            equations.add(&row, dot(found.normal, sub(found.position, body.template[v])));
             count += 1.0;
         }
-        let prior = PRIOR * TOLERANCE * TOLERANCE * f64::max(count, 1.0);
-        let gram = Mat::from_fn(k, k, |i, j| gram[i.max(j)][i.min(j)] + if i == j { prior } else { 0.0 });
-        let Ok(factor) = gram.llt(Side::Lower) else { break };
-        let solution = factor.solve(Mat::from_fn(k, 1, |i, _| right[i]));
-        shape = (0..k).map(|i| solution[(i, 0)].clamp(range[0], range[1])).collect();
+        let prior = SHAPE_PRIOR * MATCH_TOLERANCE * MATCH_TOLERANCE * f64::max(count, 1.0);
+        let Some(solution) = equations.solution(|_| prior) else { break };
+        shape = solution.into_iter().map(|x| x.clamp(range[0], range[1])).collect();
     }
     ShapeMatch { shape, mean_distance }
 }

@@ -9,7 +9,7 @@ pub struct SparseSkinWeights {
 }
 
 /// Weights at most this large move no vertex by more than a micrometre and are dropped.
-const NEGLIGIBLE: f32 = 1e-6;
+const NEGLIGIBLE_WEIGHT: f32 = 1e-6;
 
 impl SparseSkinWeights {
     /// From one list of (joint, weight) per vertex; negligible weights are dropped and each row is scaled to sum one.
@@ -18,7 +18,7 @@ impl SparseSkinWeights {
         for row in rows {
             let start = sparse.weights.len();
             for (joint, weight) in row {
-                if weight > NEGLIGIBLE || !weight.is_finite() {
+                if weight > NEGLIGIBLE_WEIGHT || !weight.is_finite() {
                     sparse.joints.push(joint);
                     sparse.weights.push(weight);
                 }
@@ -58,15 +58,21 @@ impl SparseSkinWeights {
         (&self.joints[range.clone()], &self.weights[range])
     }
 
+    /// The joints of one vertex, each with its weight.
+    ///
+    /// # Panics
+    /// As [`Self::row`].
+    pub fn of_vertex(&self, vertex: usize) -> impl Iterator<Item = (usize, f32)> {
+        let (joints, weights) = self.row(vertex);
+        joints.iter().zip(weights).map(|(joint, weight)| (usize::from(*joint), *weight))
+    }
+
     /// Dense row-major `[vertices × joint_count]`; joints at or past `joint_count` are left out.
     pub fn to_dense(&self, joint_count: usize) -> Vec<f32> {
         let mut dense = vec![0.0; self.vertex_count() * joint_count];
         for v in 0..self.vertex_count() {
-            let (joints, weights) = self.row(v);
-            for (j, w) in joints.iter().zip(weights) {
-                if usize::from(*j) < joint_count {
-                    dense[v * joint_count + usize::from(*j)] += w;
-                }
+            for (j, w) in self.of_vertex(v).filter(|(j, _)| *j < joint_count) {
+                dense[v * joint_count + j] += w;
             }
         }
         dense

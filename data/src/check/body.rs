@@ -1,5 +1,6 @@
 //! A body file.
 
+use super::checked::CheckedFile;
 use crate::asset::body_file::INSIDE_OUT;
 use crate::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings};
 use crate::format::NpzFile;
@@ -34,16 +35,8 @@ pub struct BodyCheck {
     pub inside_out: bool,
 }
 
-/// What was found out about a body.
-pub(super) struct Checked {
-    pub body: BodyCheck,
-    pub warnings: Vec<String>,
-    /// Why training would refuse it, if so.
-    pub unusable: Option<String>,
-}
-
 /// Measurements and warnings, or why the body cannot be read.
-pub(super) fn check(path: &Path, npz: &mut NpzFile) -> Result<Checked, String> {
+pub(super) fn check(path: &Path, npz: &mut NpzFile) -> Result<CheckedFile<BodyCheck>, String> {
     let settings = BodyFileSettings { shape_components: usize::MAX };
     let file = NpzFile::open(path).map_err(|e| e.to_string())?;
     let (body, was_inside_out) = Body::read_turned(file, &settings).map_err(|e| e.to_string())?;
@@ -69,14 +62,14 @@ pub(super) fn check(path: &Path, npz: &mut NpzFile) -> Result<Checked, String> {
         non_manifold_edges: topology.non_manifold_edges.len(),
         inside_out: was_inside_out,
     };
-    let unusable = body.implausibility().or_else(|| lacks_joints(check.joints));
+    let lacks_joints = || {
+        (check.joints < BODY_JOINT_COUNT).then(|| {
+            format!("{} joints; poses turn the {BODY_JOINT_COUNT} body joints of SMPL", check.joints)
+        })
+    };
+    let unusable = body.implausibility().or_else(lacks_joints);
     let unusable = unusable.map(|reason| format!("{}: {reason}", path.display()));
-    Ok(Checked { warnings: warnings(&check), unusable, body: check })
-}
-
-fn lacks_joints(joints: usize) -> Option<String> {
-    (joints < BODY_JOINT_COUNT)
-        .then(|| format!("{joints} joints; poses turn the {BODY_JOINT_COUNT} body joints of SMPL"))
+    Ok(CheckedFile { warnings: warnings(&check), unusable, measured: check })
 }
 
 fn warnings(check: &BodyCheck) -> Vec<String> {

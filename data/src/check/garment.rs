@@ -1,5 +1,6 @@
 //! A garment file: the mesh, what it is, and how it lies on the body.
 
+use super::checked::CheckedFile;
 use super::placement::misplacement;
 use super::targets::ManifestHints;
 use crate::asset::{Body, Category, Garment};
@@ -52,14 +53,6 @@ pub fn layer_guess(median_distance: f64, category: Category) -> [u32; 2] {
     [lowest, lowest + 1]
 }
 
-/// A garment that could be measured.
-pub(super) struct Checked {
-    pub garment: GarmentCheck,
-    pub warnings: Vec<String>,
-    /// Why it is of no use where it lies, if so.
-    pub misplaced: Option<String>,
-}
-
 /// Measurements and warnings, or why the garment cannot be used.
 pub(super) fn check(
     path: &Path,
@@ -67,7 +60,7 @@ pub(super) fn check(
     body: &Body,
     surface: &Surface<f64>,
     placement: &PlacementCheck,
-) -> Result<Checked, String> {
+) -> Result<CheckedFile<GarmentCheck>, String> {
     let mesh = load_tri_mesh(path).map_err(|e| e.to_string())?;
     let area = mesh.area();
     if !(area > 0.0 && area.is_finite()) {
@@ -122,11 +115,8 @@ pub(super) fn check(
     if let Some(given) = hints.category {
         warnings.extend(placement.contradiction(&mesh, body, given));
     }
-    Ok(Checked {
-        garment,
-        warnings,
-        misplaced: misplaced.map(|reason| format!("{}: {reason}", path.display())),
-    })
+    let unusable = misplaced.map(|reason| format!("{}: {reason}", path.display()));
+    Ok(CheckedFile { measured: garment, warnings, unusable })
 }
 
 fn warnings(garment: &GarmentCheck) -> Vec<String> {

@@ -4,6 +4,7 @@
 
 mod anatomy;
 mod body;
+mod checked;
 mod garment;
 mod motion;
 mod placement;
@@ -20,12 +21,13 @@ use crate::asset::motion::holds_poses;
 use crate::fit::PlacementCheck;
 use crate::folders::garment_folder::MANIFEST;
 use crate::format::NpzFile;
+use checked::CheckedFile;
 use clothcombo_physics::Surface;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// What was found out about one file.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct FileCheck {
     /// The file.
     #[serde(serialize_with = "lossy")]
@@ -52,15 +54,10 @@ fn lossy<S: serde::Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::E
 }
 
 impl FileCheck {
-    fn new(path: &Path) -> Self {
-        Self {
-            path: path.into(),
-            unusable: None,
-            warnings: Vec::new(),
-            garment: None,
-            body: None,
-            motion: None,
-        }
+    /// Takes over what was found out, but for the measurements.
+    fn take<T>(&mut self, checked: CheckedFile<T>) -> Option<T> {
+        (self.warnings, self.unusable) = (checked.warnings, checked.unusable);
+        Some(checked.measured)
     }
 }
 
@@ -85,50 +82,38 @@ impl Checker {
 
     /// Checks one file.
     pub fn check(&self, target: &Target) -> FileCheck {
-        let file = FileCheck::new(target.path());
-        let checked = match target {
+        let mut file = FileCheck { path: target.path().into(), ..FileCheck::default() };
+        file.unusable = self.fill(&mut file, target).err().or(file.unusable);
+        file
+    }
+
+    /// Adds what is found out; the error is why the file cannot be read.
+    fn fill(&self, file: &mut FileCheck, target: &Target) -> Result<(), String> {
+        match target {
             Target::Garment { path, entry } => {
-                let placement = self.placement.as_ref().map_err(Clone::clone);
-                placement.and_then(|p| garment::check(path, entry, &self.body, &self.surface, p)).map(
-                    |garment::Checked { garment, warnings, misplaced }| FileCheck {
-                        garment: Some(garment),
-                        warnings,
-                        unusable: misplaced,
-                        ..file.clone()
-                    },
-                )
+                let placement = self.placement.as_ref().map_err(Clone::clone)?;
+                file.garment = file.take(garment::check(path, entry, &self.body, &self.surface, placement)?);
             }
-            Target::Npz { path } => check_npz(&file, path),
+            Target::Npz { path } => {
+                let mut npz = NpzFile::open(path).map_err(|e| e.to_string())?;
+                if npz.contains("v_template") {
+                    file.body = file.take(body::check(path, &mut npz)?);
+                } else if holds_poses(&npz) {
+                    file.motion = file.take(motion::check(path)?);
+                } else {
+                    let path = path.display();
+                    return Err(format!(
+                        "{path}: neither a body (no key 'v_template') nor a motion (no key 'poses')"
+                    ));
+                }
+            }
             Target::Unlisted { .. } => {
-                let warning = format!("not in the {MANIFEST} beside it, so no dataset takes it");
-                Ok(FileCheck { warnings: vec![warning], ..file.clone() })
+                file.warnings.push(format!("not in the {MANIFEST} beside it, so no dataset takes it"));
             }
-            Target::Unusable { reason, .. } => Err(reason.clone()),
-        };
-        checked.unwrap_or_else(|reason| FileCheck { unusable: Some(reason), ..file })
+            Target::Unusable { reason, .. } => return Err(reason.clone()),
+        }
+        Ok(())
     }
-}
-
-fn check_npz(file: &FileCheck, path: &Path) -> Result<FileCheck, String> {
-    let mut npz = NpzFile::open(path).map_err(|e| e.to_string())?;
-    if npz.contains("v_template") {
-        let body::Checked { body, warnings, unusable } = body::check(path, &mut npz)?;
-        Ok(FileCheck { body: Some(body), warnings, unusable, ..file.clone() })
-    } else if holds_poses(&npz) {
-        let (check, warnings) = motion::check(path)?;
-        let unusable = motion::unusable(&check, path);
-        Ok(FileCheck { motion: Some(check), warnings, unusable, ..file.clone() })
-    } else if npz.contains("positions") && npz.contains("f") {
-        let warning = "a simulated sequence: training does not read it".into();
-        Ok(FileCheck { warnings: vec![warning], ..file.clone() })
-    } else {
-        Err(format!("{}: neither a body (no key 'v_template') nor a motion (no key 'poses')", path.display()))
-    }
-}
-
-/// Whether a file is a body npz, by its keys.
-pub fn is_body_file(path: &Path) -> bool {
-    NpzFile::open(path).is_ok_and(|file| file.contains("v_template"))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! A motion file.
 
-use super::impossible_turn;
+use super::anatomy::impossible_turn;
+use super::checked::CheckedFile;
 use crate::asset::motion::mean_up;
 use crate::asset::{BODY_JOINT_NAMES, Motion, Pose};
 use crate::generate::pose::JOINT_LIMITS;
@@ -26,7 +27,7 @@ pub struct MotionCheck {
 }
 
 /// Excess over a limit that is measurement noise (degrees).
-const TOLERANCE: f64 = 1.0;
+const LIMIT_TOLERANCE: f64 = 1.0;
 
 /// How far every joint but the pelvis is outside its range of motion, in the angle that is farthest (degrees); 0 within. The
 /// heading of the pelvis is free, and falls and floor poses turn it anyhow.
@@ -56,15 +57,6 @@ pub fn not_upright(poses: &[Pose]) -> Option<String> {
 /// Excess over a limit that no file of angles in radians has (degrees): a whole turn.
 const NOT_RADIANS: f64 = 360.0;
 
-/// Why training would refuse the motion, if it would.
-pub(super) fn unusable(check: &MotionCheck, path: &Path) -> Option<String> {
-    let reason = match check.frames {
-        1 => Some("a single frame is no motion; join still poses in one file".to_owned()),
-        _ => beyond_range(check.largest_excess_degrees),
-    };
-    reason.map(|reason| format!("{}: {reason}", path.display()))
-}
-
 fn beyond_range(excess: f64) -> Option<String> {
     (excess > NOT_RADIANS).then(|| format!("joints turn {excess:.0}° beyond their range: angles in degrees?"))
 }
@@ -76,7 +68,7 @@ pub fn not_radians<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<Stri
 }
 
 /// Measurements and warnings, or why the motion cannot be used.
-pub(super) fn check(path: &Path) -> Result<(MotionCheck, Vec<String>), String> {
+pub(super) fn check(path: &Path) -> Result<CheckedFile<MotionCheck>, String> {
     // NaN, wrong shapes and rates are refused here, with frame and joint.
     let motion = Motion::load(path).map_err(|e| e.to_string())?;
     if motion.poses.is_empty() {
@@ -94,7 +86,7 @@ pub(super) fn check(path: &Path) -> Result<(MotionCheck, Vec<String>), String> {
         let mut outside = false;
         for (joint, excess) in excesses(pose) {
             check.largest_excess_degrees = check.largest_excess_degrees.max(excess);
-            if excess > TOLERANCE {
+            if excess > LIMIT_TOLERANCE {
                 outside = true;
                 *check.joints_outside_limits.entry(BODY_JOINT_NAMES[joint].to_string()).or_default() += 1;
             }
@@ -102,5 +94,10 @@ pub(super) fn check(path: &Path) -> Result<(MotionCheck, Vec<String>), String> {
         check.frames_outside_limits += usize::from(outside);
     }
     let warnings = [impossible_turn(&motion.poses), not_upright(&motion.poses)];
-    Ok((check, warnings.into_iter().flatten().collect()))
+    let reason = match check.frames {
+        1 => Some("a single frame is no motion; join still poses in one file".to_owned()),
+        _ => beyond_range(check.largest_excess_degrees),
+    };
+    let unusable = reason.map(|reason| format!("{}: {reason}", path.display()));
+    Ok(CheckedFile { measured: check, warnings: warnings.into_iter().flatten().collect(), unusable })
 }

@@ -1,9 +1,8 @@
 //! Which files a list of paths means.
 
-use super::is_body_file;
 use crate::asset::Category;
 use crate::folders::garment_folder::{MANIFEST, list_garment_folder, read_entries};
-use crate::format::{folder, is_mesh_path, way_out};
+use crate::format::{NpzFile, folder, is_mesh_path, way_out};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -93,6 +92,11 @@ pub fn find_targets(paths: &[PathBuf]) -> Vec<Target> {
         }
     }
     targets
+}
+
+/// Whether a file is a body npz, by its keys.
+fn is_body_file(path: &Path) -> bool {
+    NpzFile::open(path).is_ok_and(|file| file.contains("v_template"))
 }
 
 /// The one body among `targets`; none where there are several.

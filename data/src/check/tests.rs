@@ -1,9 +1,8 @@
 use super::*;
 use crate::asset::{Category, Garment, Motion, Pose, Provenance};
-use crate::folders::{FolderGarment, save_garment_folder};
-use crate::format::npz::NpzWriter;
+use crate::folders::save_garment_folder;
 use crate::format::obj;
-use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
+use crate::generate::{GarmentGenerator, mannequin};
 use std::fs;
 
 fn by_name<'a>(files: &'a [FileCheck], name: &str) -> &'a FileCheck {
@@ -13,20 +12,15 @@ fn by_name<'a>(files: &'a [FileCheck], name: &str) -> &'a FileCheck {
 #[test]
 fn a_dataset_with_good_and_bad_files_is_told_apart() {
     let body = mannequin();
-    let settings = GarmentSettings { target_vertices: 400, ..GarmentSettings::default() };
     let generator = GarmentGenerator::new(&body).unwrap();
-    let garments: Vec<FolderGarment> = [Category::Skirt, Category::TShirt]
-        .into_iter()
-        .map(|category| FolderGarment {
-            garment: generator.generate(category, 1, &settings).unwrap(),
-            layer: Some([2, 3]),
-            path: PathBuf::new(),
-        })
-        .collect();
-    let skirt: &Garment = &garments[0].garment;
+    let garments =
+        [Category::Skirt, Category::TShirt].map(|category| generator.generate(category, 1, 400).unwrap());
+    let skirt: &Garment = &garments[0];
     let folder = tempfile::tempdir().unwrap();
     let listed = folder.path().join("listed");
     save_garment_folder(&listed, &garments).unwrap();
+    let manifest = fs::read_to_string(listed.join(MANIFEST)).unwrap();
+    fs::write(listed.join(MANIFEST), manifest.replace("name =", "layer = [2, 3]\nname =")).unwrap();
     fs::write(listed.join("unlisted.obj"), "not read").unwrap();
     let loose = folder.path().join("loose");
     let inside: Vec<[f64; 3]> =
@@ -44,9 +38,6 @@ fn a_dataset_with_good_and_bad_files_is_told_apart() {
     let motion = Motion { name: String::new(), frame_rate: 2.0, poses, source: Provenance::default() };
     motion.save(&folder.path().join("motions/knee.npz")).unwrap();
     fs::write(folder.path().join("motions/cut.npz"), b"PK").unwrap();
-    let mut sequence = NpzWriter::new();
-    sequence.f32("positions", &[1, 3, 3], &[0.0; 9]).u32("f", &[1, 3], &[0, 1, 2]);
-    sequence.save(&folder.path().join("sequence.npz")).unwrap();
     let twice = folder.path().join("twice");
     obj::save(&twice.join("a.obj"), skirt.rest.positions(), skirt.rest.faces(), &[]).unwrap();
     fs::write(twice.join("garments.toml"), "[[garment]]\nfile = \"a.obj\"\n".repeat(2)).unwrap();
@@ -63,7 +54,6 @@ fn a_dataset_with_good_and_bad_files_is_told_apart() {
         unusable,
         ["broken.stl", "centimetres.obj", "tight.obj", "cut.npz", "garments.toml", "missing"]
     );
-    assert!(by_name(&files, "sequence.npz").warnings[0].contains("simulated sequence"));
     let unlisted = by_name(&files, "unlisted.obj");
     assert!(unlisted.garment.is_none() && unlisted.warnings.iter().any(|w| w.contains("garments.toml")));
 

@@ -86,7 +86,7 @@ impl TermReport {
 
 /// What became of a case.
 #[derive(Debug)]
-pub enum Outcome {
+pub enum CaseOutcome {
     /// Every term was evaluated; `None` where the scene has no such term.
     Evaluated(Box<TermMap<Option<TermReport>>>),
     /// Loading refused it.
@@ -101,23 +101,23 @@ pub struct CaseReport {
     /// Vertices of all garments; 0 if there are none.
     pub vertices: usize,
     /// What became of it.
-    pub outcome: Outcome,
+    pub outcome: CaseOutcome,
 }
 
 impl CaseReport {
     /// Every invariant that does not hold, with its term; empty if the case is good.
     pub fn faults(&self) -> Vec<String> {
         match (&self.outcome, self.case.expectation) {
-            (Outcome::Evaluated(terms), Expectation::Bounded) => {
+            (CaseOutcome::Evaluated(terms), Expectation::Bounded) => {
                 let faults =
                     terms.iter().filter_map(|(term, report)| Some((term, report.as_ref()?.fault()?)));
                 faults.map(|(term, fault)| format!("{term}: {fault}")).collect()
             }
-            (Outcome::Refused(error), Expectation::Refused(text)) if error.to_string().contains(text) => {
+            (CaseOutcome::Refused(error), Expectation::Refused(text)) if error.to_string().contains(text) => {
                 Vec::new()
             }
-            (Outcome::Refused(error), _) => vec![format!("refused: {error}")],
-            (Outcome::Evaluated(_), Expectation::Refused(text)) => {
+            (CaseOutcome::Refused(error), _) => vec![format!("refused: {error}")],
+            (CaseOutcome::Evaluated(_), Expectation::Refused(text)) => {
                 vec![format!("not refused with \"{text}\"")]
             }
         }
@@ -130,8 +130,8 @@ impl DegenerateCases<'_> {
         let evaluated =
             self.scene(case).and_then(|scene| Ok((scene.vertex_count(), assess(&scene, settings, terms)?)));
         let (vertices, outcome) = match evaluated {
-            Ok((vertices, terms)) => (vertices, Outcome::Evaluated(Box::new(terms))),
-            Err(error) => (0, Outcome::Refused(error)),
+            Ok((vertices, terms)) => (vertices, CaseOutcome::Evaluated(Box::new(terms))),
+            Err(error) => (0, CaseOutcome::Refused(error)),
         };
         CaseReport { case: *case, vertices, outcome }
     }

@@ -14,6 +14,9 @@ pub enum Expectation {
     Refused(&'static str),
 }
 
+/// How the scene of a case is made.
+pub(super) type BuildScene = fn(&Fixture<'_>) -> Result<CaseScene, CaseError>;
+
 /// A case.
 #[derive(Debug, Clone, Copy)]
 pub struct DegenerateCase {
@@ -23,15 +26,24 @@ pub struct DegenerateCase {
     pub description: &'static str,
     /// What must hold.
     pub expectation: Expectation,
-    pub(super) build: fn(&Fixture<'_>) -> Result<CaseScene, CaseError>,
+    pub(super) build: BuildScene,
 }
 
-impl DegenerateCase {
-    pub(super) const fn bounded(
-        name: &'static str,
-        description: &'static str,
-        build: fn(&Fixture<'_>) -> Result<CaseScene, CaseError>,
-    ) -> Self {
-        Self { name, description, expectation: Expectation::Bounded, build }
-    }
+/// A case whose energies are bounded.
+pub(super) const fn bounded(
+    name: &'static str,
+    description: &'static str,
+    build: BuildScene,
+) -> DegenerateCase {
+    DegenerateCase { name, description, expectation: Expectation::Bounded, build }
+}
+
+/// A case that loading refuses with a message that holds `text`.
+pub(super) const fn refused(
+    name: &'static str,
+    description: &'static str,
+    text: &'static str,
+    build: BuildScene,
+) -> DegenerateCase {
+    DegenerateCase { name, description, expectation: Expectation::Refused(text), build }
 }

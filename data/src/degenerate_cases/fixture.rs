@@ -1,9 +1,8 @@
 //! What degenerate cases are made of: a body, two garments that fit it, and a piece of cloth against its chest.
 
 use super::scene::{CaseError, CaseGarment, CaseScene};
-use crate::asset::body::skin;
-use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, skeleton};
-use crate::generate::{GarmentError, GarmentGenerator, GarmentSettings};
+use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose};
+use crate::generate::{GarmentError, GarmentGenerator};
 use clothcombo_physics::mesh::shapes;
 use clothcombo_physics::{MeshError, TriMesh, vec3, vertex_normals};
 
@@ -18,6 +17,10 @@ const CURVATURE: f64 = 2.0;
 
 /// How far canonical positions are above those at rest, so that the holding energy has something to hold (m).
 const RAISED: f64 = 5e-3;
+
+/// An interior vertex of the piece of cloth, and the one beside it.
+pub(super) const MIDDLE: usize = 24;
+pub(super) const BESIDE_MIDDLE: usize = 25;
 
 /// Vertices per generated garment, about.
 const GARMENT_VERTICES: usize = 220;
@@ -35,9 +38,8 @@ pub(super) struct Fixture<'a> {
 impl<'a> Fixture<'a> {
     pub(super) fn new(body: &'a Body) -> Result<Self, GarmentError> {
         let generator = GarmentGenerator::new(body)?;
-        let settings = GarmentSettings { target_vertices: GARMENT_VERTICES, ..GarmentSettings::default() };
         let cut = |category| {
-            let garment = generator.generate(category, 1, &settings)?;
+            let garment = generator.generate(category, 1, GARMENT_VERTICES)?;
             let binding = Binding::new(&garment, body, &BindingSettings::default());
             Ok::<_, GarmentError>((garment, binding))
         };
@@ -53,14 +55,39 @@ impl<'a> Fixture<'a> {
         shapes::mapped(&flat, |[u, v, _]| [x + u - 0.1, y + v - 0.1, z - CHEST_DEPTH + bent(u - 0.1)])
     }
 
+    /// The piece of cloth with vertex `v` at `p`.
+    pub(super) fn sheet_with_vertex(&self, v: usize, p: [f64; 3]) -> Result<TriMesh, MeshError> {
+        let sheet = self.sheet();
+        let mut positions = sheet.positions().to_vec();
+        positions[v] = p;
+        sheet.with_positions(positions)
+    }
+
+    /// The piece of cloth with vertex `v` where `other` is.
+    pub(super) fn sheet_with_joined_vertices(&self, v: usize, other: usize) -> Result<TriMesh, MeshError> {
+        self.sheet_with_vertex(v, self.sheet().positions()[other])
+    }
+
     /// `point` of a frame in which the piece of cloth is centred on the origin, as the body sees it.
     pub(super) fn before_chest(&self, point: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = self.chest;
         vec3::add(point, [x, y, z - CHEST_DEPTH])
     }
 
+    /// The piece of cloth, moved by `f`.
+    pub(super) fn draped(&self, f: impl Fn([f64; 3]) -> [f64; 3]) -> Result<CaseScene, CaseError> {
+        let sheet = self.sheet();
+        let posed = shapes::mapped(&sheet, f);
+        self.two_layers(sheet, &posed)
+    }
+
+    /// The piece of cloth with another rest shape.
+    pub(super) fn with_rest(&self, rest: TriMesh) -> Result<CaseScene, CaseError> {
+        self.two_layers(rest, &self.sheet())
+    }
+
     /// Two layers of the garment of rest shape `rest` at `posed` on the T-posed body, the outer one on the wrong side.
-    pub(super) fn two_layers(&self, rest: TriMesh, posed: Vec<[f64; 3]>) -> Result<CaseScene, CaseError> {
+    pub(super) fn two_layers(&self, rest: TriMesh, posed: &TriMesh) -> Result<CaseScene, CaseError> {
         let inner = cloth("inner", rest, posed);
         let outer = below(&inner);
         self.scene(vec![inner, outer])
@@ -68,22 +95,19 @@ impl<'a> Fixture<'a> {
 
     /// `garments` on the T-posed body.
     pub(super) fn scene(&self, garments: Vec<CaseGarment>) -> Result<CaseScene, CaseError> {
-        let pose = Pose::t_pose(self.body.joint_count());
-        let scene = CaseScene { shape: Vec::new(), pose, body: self.body.zero_body(), garments };
-        finished(scene)
+        Ok(CaseScene { body: self.body.zero_body(), garments }.rounded())
     }
 
     /// Trousers and T-shirt, each in two layers, on the body of shape `shape` in `pose`, as skinning leaves them.
-    pub(super) fn dressed(&self, shape: &[f64], pose: Pose) -> Result<CaseScene, CaseError> {
-        let posed = self.body.posed(shape, &pose)?;
+    pub(super) fn dressed(&self, shape: &[f64], pose: &Pose) -> Result<CaseScene, CaseError> {
+        let posed = self.body.posed(shape, pose)?;
         let body = TriMesh::new(posed.positions, self.body.faces.to_vec())?;
         let garments = [&self.trousers, &self.t_shirt].into_iter().flat_map(|(garment, binding)| {
             let inner = self.skinned(garment, binding, shape, &posed.bones);
             let outer = below(&inner);
             [inner, outer]
         });
-        let garments = garments.collect();
-        finished(CaseScene { shape: shape.to_vec(), pose, body, garments })
+        Ok(CaseScene { body, garments: garments.collect() }.rounded())
     }
 
     /// The T-shirt on the T-posed body.
@@ -103,10 +127,7 @@ impl<'a> Fixture<'a> {
         for (p, moved) in canonical.iter_mut().zip(binding.shape_displacement(shape, self.body.shape_count)) {
             vec3::accumulate(p, moved);
         }
-        let weights = binding.skin_weights.chunks_exact(bones.len());
-        let weighted = |row: &'_ [f32]| -> Vec<f64> { row.iter().map(|w| f64::from(*w)).collect() };
-        let posed = canonical.iter().zip(weights).map(|(p, row)| skin(*p, bones.iter().zip(weighted(row))));
-        let (posed, canonical) = (posed.collect(), raised(&canonical));
+        let (posed, canonical) = (binding.skinned(&canonical, bones), raised(&canonical));
         // Held whatever its height: the holding energy is to be tested here as well.
         let garment = Garment { holding: true, ..garment.clone() };
         CaseGarment { garment, canonical, posed }
@@ -114,7 +135,8 @@ impl<'a> Fixture<'a> {
 }
 
 /// A garment that is nothing but its mesh, at `posed` after skinning and a little higher before.
-pub(super) fn cloth(name: &str, rest: TriMesh, posed: Vec<[f64; 3]>) -> CaseGarment {
+pub(super) fn cloth(name: &str, rest: TriMesh, posed: &TriMesh) -> CaseGarment {
+    let posed = posed.positions().to_vec();
     let garment = Garment { name: name.to_string(), holding: true, ..Garment::new(Category::Top, rest) };
     CaseGarment { garment, canonical: raised(&posed), posed }
 }
@@ -124,28 +146,16 @@ fn raised(positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
 }
 
 /// The same garment a millimetre below itself, where it should not be.
-pub(super) fn below(inner: &CaseGarment) -> CaseGarment {
+fn below(inner: &CaseGarment) -> CaseGarment {
     let normals = vertex_normals(&inner.posed, inner.garment.rest.faces());
     let sunk = inner.posed.iter().zip(normals).map(|(p, n)| vec3::add_scaled(*p, -WRONG_SIDE, n));
     let garment = Garment { name: format!("{}, outer", inner.garment.name), ..inner.garment.clone() };
     CaseGarment { garment, canonical: inner.canonical.clone(), posed: sunk.collect() }
 }
 
-/// `mesh` with vertex `v` at `p`.
-pub(super) fn with_vertex(mesh: &TriMesh, v: usize, p: [f64; 3]) -> Result<TriMesh, MeshError> {
-    let mut positions = mesh.positions().to_vec();
-    positions[v] = p;
-    mesh.with_positions(positions)
-}
-
-fn finished(scene: CaseScene) -> Result<CaseScene, CaseError> {
-    Ok(scene.rounded())
-}
-
 /// The foremost vertex around the breastbone.
 fn chest(body: &Body) -> [f64; 3] {
-    let height =
-        skeleton::joint_index("spine3").and_then(|j| body.joint_template.get(j)).map_or(0.0, |p| p[1]);
+    let height = body.joint_place("spine3").map_or(0.0, |p| p[1]);
     let central = |p: &&[f64; 3]| p[0].abs() < 0.1 && (p[1] - height).abs() < 0.05;
     let foremost = |points: &mut dyn Iterator<Item = &[f64; 3]>| -> Option<[f64; 3]> {
         points.max_by(|a, b| a[2].total_cmp(&b[2])).copied()

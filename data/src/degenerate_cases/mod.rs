@@ -1,8 +1,7 @@
 //! Degenerate cases: garments, bodies and placements that break naive cloth energies, each with a name and an invariant.
 //!
-//! One suite for everything that has to survive them: the tests of the energies, `clothcombo bench stability`, and the
-//! stability evaluation of trained networks, which reads shape, pose and garments of the same scenes. Needs no files: the
-//! built-in mannequin is a body as good as any, and [`DegenerateCases::new`] takes any other.
+//! One suite for everything that has to survive them: the tests of the energies and `clothcombo bench stability`. Needs no
+//! files: the built-in mannequin is a body as good as any, and [`DegenerateCases::new`] takes any other.
 //!
 //! Every case is a whole scene, most of them with two layers in contact with each other and with the body, so that every
 //! term has something to say. Positions are rounded to `f32`: both precisions see the same scene.
@@ -18,7 +17,7 @@ mod rest_shapes;
 mod scene;
 mod suite;
 
-pub use assess::{CaseReport, Outcome, TermReport};
+pub use assess::{CaseOutcome, CaseReport, TermReport};
 pub use case::{DegenerateCase, Expectation};
 pub use scene::{CaseError, CaseGarment, CaseScene};
 pub use suite::DegenerateCases;

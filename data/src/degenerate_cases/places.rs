@@ -1,55 +1,40 @@
 //! Where a garment is, how large, and how many there are.
 
-use super::case::DegenerateCase;
-use super::fixture::{Fixture, below, cloth};
-use super::scene::{CaseError, CaseGarment, CaseScene};
+use super::case::{DegenerateCase, bounded};
+use super::fixture::{Fixture, cloth};
+use super::scene::{CaseError, CaseGarment};
 use crate::mesh::compact;
 use clothcombo_physics::mesh::shapes::{mapped, tube};
 use clothcombo_physics::{TriMesh, vec3, vertex_normals};
 
 /// Layers of the deepest outfit.
-const LAYERS: usize = 12;
+const STACKED_LAYERS: usize = 12;
 
-pub(super) const CASES: &[DegenerateCase] = &[
-    DegenerateCase::bounded("inside the body", "The whole garment lies in the middle of the chest.", |w| {
-        let sheet = w.sheet();
+pub(super) const PLACE_CASES: &[DegenerateCase] = &[
+    bounded("inside the body", "The whole garment lies in the middle of the chest.", |w| {
         let middle = [w.chest[0], w.chest[1], 0.5 * w.chest[2]];
         let centre = w.before_chest([0.0; 3]);
-        let posed = mapped(&sheet, |p| vec3::add_scaled(middle, 0.3, vec3::sub(p, centre)));
-        w.two_layers(sheet, posed.positions().to_vec())
+        w.draped(|p| vec3::add_scaled(middle, 0.3, vec3::sub(p, centre)))
     }),
-    DegenerateCase::bounded("far away", "The garment is 100 m from the body.", |w| {
-        moved(w, [60.0, 0.0, 80.0])
+    bounded("far away", "The garment is 100 m from the body.", |w| {
+        w.draped(|p| vec3::add(p, [60.0, 0.0, 80.0]))
     }),
-    DegenerateCase::bounded("far behind", "The garment is 100 m behind the body.", |w| {
-        moved(w, [0.0, 0.0, -100.0])
+    bounded("far behind", "The garment is 100 m behind the body.", |w| {
+        w.draped(|p| vec3::add(p, [0.0, 0.0, -100.0]))
     }),
-    DegenerateCase::bounded(
-        "exactly on the body",
-        "A piece of the body's own surface: every distance is zero.",
-        |w| {
-            let skin = chest_skin(w)?;
-            let posed = skin.positions().to_vec();
-            let inner = cloth("skin", skin, posed);
-            let outer = below(&inner);
-            w.scene(vec![inner, outer])
-        },
-    ),
-    DegenerateCase::bounded(
-        "a million metres away",
-        "Coordinates so large that f32 resolves six centimetres.",
-        |w| moved(w, [1e6, 0.0, 0.0]),
-    ),
-    DegenerateCase::bounded(
+    bounded("exactly on the body", "A piece of the body's own surface: every distance is zero.", |w| {
+        let skin = chest_skin(w)?;
+        w.two_layers(skin.clone(), &skin)
+    }),
+    bounded("a million metres away", "Coordinates so large that f32 resolves six centimetres.", |w| {
+        w.draped(|p| vec3::add(p, [1e6, 0.0, 0.0]))
+    }),
+    bounded(
         "stretched to a million metres",
         "An explosion: every vertex is a thousand kilometres from the next.",
-        |w| {
-            let sheet = w.sheet();
-            let posed = mapped(&sheet, |p| vec3::scale(p, 5e6)).positions().to_vec();
-            w.two_layers(sheet, posed)
-        },
+        |w| w.draped(|p| vec3::scale(p, 5e6)),
     ),
-    DegenerateCase::bounded(
+    bounded(
         "50,000 vertices",
         "A cape from the trunk to metres around it, with a coarse garment over it.",
         |w| {
@@ -65,14 +50,14 @@ pub(super) const CASES: &[DegenerateCase] = &[
                     let ripple = 1.0 + 0.02 * (40.0 * y).sin() + 0.01 * (9.0 * x.atan2(z)).cos();
                     [ripple * x, y, ripple * z]
                 };
-                mapped(mesh, wave).positions().to_vec()
+                mapped(mesh, wave)
             };
             let (dense, coarse) = (around_trunk(0.15, 400, 124), around_trunk(0.149, 20, 10));
             let (dense_posed, coarse_posed) = (wavy(&dense), wavy(&coarse));
-            w.scene(vec![cloth("dense", dense, dense_posed), cloth("coarse", coarse, coarse_posed)])
+            w.scene(vec![cloth("dense", dense, &dense_posed), cloth("coarse", coarse, &coarse_posed)])
         },
     ),
-    DegenerateCase::bounded(
+    bounded(
         "12 layers",
         "Twelve T-shirts over each other, a millimetre apart, every other one in the wrong order.",
         |w| {
@@ -88,16 +73,10 @@ pub(super) const CASES: &[DegenerateCase] = &[
                 garment.holding = true;
                 CaseGarment { canonical: moved(&shirt.canonical), posed: moved(&shirt.posed), garment }
             };
-            w.scene((0..LAYERS).map(layer).collect())
+            w.scene((0..STACKED_LAYERS).map(layer).collect())
         },
     ),
 ];
-
-fn moved(w: &Fixture<'_>, by: [f64; 3]) -> Result<CaseScene, CaseError> {
-    let sheet = w.sheet();
-    let posed = mapped(&sheet, |p| vec3::add(p, by)).positions().to_vec();
-    w.two_layers(sheet, posed)
-}
 
 /// The faces of the zero body whose corners lie within 10 cm of the chest.
 fn chest_skin(w: &Fixture<'_>) -> Result<TriMesh, CaseError> {

@@ -1,26 +1,15 @@
 //! The scene of a degenerate case, and its energies in either precision.
 
-use crate::asset::{BodyError, Garment, Pose};
+use crate::asset::Garment;
 use clothcombo_physics::energy::{
     EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers, TermMap,
 };
-use clothcombo_physics::{EnergyError, MeshError, Real, Surface, Topology, TriMesh, vec3};
+use clothcombo_physics::{EnergyError, Real, Surface, Topology, TriMesh, vec3};
+use std::error::Error;
 use std::sync::Arc;
-use thiserror::Error;
 
-/// Why a case has no scene or no energies.
-#[derive(Debug, Error)]
-pub enum CaseError {
-    /// A mesh is refused.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// Energies are refused.
-    #[error(transparent)]
-    Energy(#[from] EnergyError),
-    /// A body is refused.
-    #[error(transparent)]
-    Body(#[from] BodyError),
-}
+/// Why a case has no scene or no energies: a mesh, a body or its energies are refused.
+pub type CaseError = Box<dyn Error + Send + Sync>;
 
 /// One garment of a degenerate case.
 #[derive(Debug, Clone)]
@@ -36,10 +25,6 @@ pub struct CaseGarment {
 /// Garments on a posed body, from the body outwards.
 #[derive(Debug, Clone)]
 pub struct CaseScene {
-    /// Shape numbers of the body.
-    pub shape: Vec<f64>,
-    /// Its pose.
-    pub pose: Pose,
     /// The posed body (m).
     pub body: TriMesh,
     /// The garments.

@@ -1,9 +1,13 @@
 //! All cases on one body.
 
+use super::bodies::BODY_CASES;
+use super::broken::BROKEN_CASES;
 use super::case::DegenerateCase;
 use super::fixture::Fixture;
+use super::places::PLACE_CASES;
+use super::poses::POSE_CASES;
+use super::rest_shapes::REST_CASES;
 use super::scene::{CaseError, CaseScene};
-use super::{bodies, broken, places, poses, rest_shapes};
 use crate::asset::Body;
 use crate::generate::GarmentError;
 
@@ -24,7 +28,7 @@ impl<'a> DegenerateCases<'a> {
 
     /// All cases, the same for every body.
     pub fn all() -> impl Iterator<Item = &'static DegenerateCase> {
-        [rest_shapes::CASES, poses::CASES, places::CASES, bodies::CASES, broken::CASES].into_iter().flatten()
+        [REST_CASES, POSE_CASES, PLACE_CASES, BODY_CASES, BROKEN_CASES].into_iter().flatten()
     }
 
     /// The scene of a case on this body.

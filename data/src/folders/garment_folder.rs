@@ -28,17 +28,6 @@ use std::path::{Path, PathBuf};
 /// Name of the manifest in a garment folder.
 pub const MANIFEST: &str = "garments.toml";
 
-/// A garment of a folder with its layer hint.
-#[derive(Clone, Debug)]
-pub struct FolderGarment {
-    /// The garment.
-    pub garment: Garment,
-    /// Lowest and highest layer it may be in, if the manifest says so.
-    pub layer: Option<[u32; 2]>,
-    /// Its mesh file.
-    pub path: PathBuf,
-}
-
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Manifest {
@@ -101,13 +90,12 @@ impl ListedGarment {
     ///
     /// # Errors
     /// [`FileError`] naming file and line or element.
-    pub fn load(&self, body: &Body) -> Result<FolderGarment, FileError> {
+    pub fn load(&self, body: &Body) -> Result<Garment, FileError> {
         let rest = load_tri_mesh(&self.path)?;
         let category = self.category.unwrap_or_else(|| Category::guess(&rest, body));
         let holding = self.holding.unwrap_or_else(|| Garment::needs_holding(&rest, body));
         let (name, source) = (self.name.clone(), self.source.clone());
-        let garment = Garment { name, category, rest, holding, material: self.material, source };
-        Ok(FolderGarment { garment, layer: self.layer, path: self.path.clone() })
+        Ok(Garment { name, category, rest, holding, material: self.material, source })
     }
 }
 
@@ -116,7 +104,7 @@ impl ListedGarment {
 ///
 /// # Errors
 /// [`FileError`] naming folder, manifest entry, or mesh file and line or element.
-pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarment>, FileError> {
+pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<Garment>, FileError> {
     let listed = list_garment_folder(folder)?;
     listed.par_iter().map(|garment| garment.load(body)).collect()
 }
@@ -191,13 +179,13 @@ fn list_mesh_files(path: &Path) -> Result<Vec<String>, FileError> {
 
 impl ManifestEntry {
     /// The entry of a garment whose file is `<name>.obj`.
-    pub fn of(FolderGarment { garment, layer, .. }: &FolderGarment) -> Self {
+    pub fn of(garment: &Garment) -> Self {
         let Provenance { source, author, licence } = garment.source.clone();
         Self {
             file: format!("{}.obj", garment.name),
             name: Some(garment.name.clone()),
             category: Some(garment.category),
-            layer: *layer,
+            layer: None,
             holding: Some(garment.holding),
             material: garment.material,
             source,
@@ -248,28 +236,28 @@ mod tests {
         let material = "thickness=0.003".parse().unwrap();
         let garment = Garment { name: "ring".into(), holding: true, material, source, ..ring };
         let folder = tempfile::tempdir().unwrap();
-        let saved = FolderGarment { garment, layer: Some([1, 3]), path: PathBuf::new() };
-        let written = save_garment_folder(folder.path(), std::slice::from_ref(&saved)).unwrap();
+        let written = save_garment_folder(folder.path(), std::slice::from_ref(&garment)).unwrap();
         assert_eq!(written.len(), 2);
         let loaded = load_garment_folder(folder.path(), &body).unwrap();
         let [one] = &loaded[..] else { panic!() };
-        assert_eq!((one.layer, &one.garment.source), (saved.layer, &saved.garment.source));
-        assert_eq!((one.garment.category, one.garment.holding), (Category::Skirt, true));
-        assert_eq!(one.garment.material, material);
-        assert_eq!(one.garment.rest.faces(), saved.garment.rest.faces());
-        for (a, b) in
-            one.garment.rest.positions().iter().flatten().zip(saved.garment.rest.positions().iter().flatten())
-        {
+        assert_eq!(one.source, garment.source);
+        assert_eq!((one.category, one.holding), (Category::Skirt, true));
+        assert_eq!(one.material, material);
+        assert_eq!(one.rest.faces(), garment.rest.faces());
+        for (a, b) in one.rest.positions().iter().flatten().zip(garment.rest.positions().iter().flatten()) {
             assert!((a - b).abs() < 1e-7);
         }
+        let manifest = fs::read_to_string(folder.path().join(MANIFEST)).unwrap();
+        fs::write(folder.path().join(MANIFEST), manifest.replace("name =", "layer = [1, 3]\nname ="))
+            .unwrap();
+        assert_eq!(list_garment_folder(folder.path()).unwrap()[0].layer, Some([1, 3]));
     }
 
     #[test]
     fn what_a_folder_lists_stays_listed_and_what_it_does_not_list_is_not_hidden() {
         let named = |name: &str, height: f64| {
             let rest = tube(0.1, height, 8, 4);
-            let garment = Garment { name: name.into(), ..Garment::new(Category::Top, rest) };
-            FolderGarment { garment, layer: None, path: PathBuf::new() }
+            Garment { name: name.into(), ..Garment::new(Category::Top, rest) }
         };
         let folder = folder_with(&[]);
         save_garment_folder(folder.path(), &[named("a", 0.2), named("b", 0.2)]).unwrap();
@@ -289,11 +277,8 @@ mod tests {
     fn without_a_manifest_every_mesh_is_a_garment() {
         let folder =
             folder_with(&[("b.obj", TRIANGLE), ("a.OBJ", TRIANGLE), ("c.ply", PLY), ("notes.txt", "x")]);
-        let names: Vec<String> = load_garment_folder(folder.path(), &mannequin())
-            .unwrap()
-            .into_iter()
-            .map(|g| g.garment.name)
-            .collect();
+        let names: Vec<String> =
+            load_garment_folder(folder.path(), &mannequin()).unwrap().into_iter().map(|g| g.name).collect();
         assert_eq!(names, ["a", "b", "c"]);
     }
 

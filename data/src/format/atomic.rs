@@ -29,7 +29,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// The temporary files and folders of this process, each with the outermost folder that is made for it, if any.
-static TEMPORARY: Mutex<Vec<(PathBuf, Option<PathBuf>)>> = Mutex::new(Vec::new());
+static TEMPORARY_PATHS: Mutex<Vec<(PathBuf, Option<PathBuf>)>> = Mutex::new(Vec::new());
 
 /// The name of a file or folder that is not whole yet. What is there, and the folders that were missing above it, is removed when
 /// this is dropped, or where the process ends before that ([`remove_temporary`]), unless it is [kept](Self::keep).
@@ -40,7 +40,7 @@ impl Temporary {
     /// Nothing needs to be there yet.
     pub fn new(path: PathBuf) -> Self {
         let made = first_missing_folder(&path).map(Path::to_owned);
-        TEMPORARY.lock().unwrap_or_else(PoisonError::into_inner).push((path.clone(), made));
+        TEMPORARY_PATHS.lock().unwrap_or_else(PoisonError::into_inner).push((path.clone(), made));
         Self(path)
     }
 
@@ -82,7 +82,7 @@ impl Temporary {
     }
 
     fn forget(&self) -> Option<(PathBuf, Option<PathBuf>)> {
-        let mut all = TEMPORARY.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = TEMPORARY_PATHS.lock().unwrap_or_else(PoisonError::into_inner);
         let own = all.iter().position(|(path, _)| *path == self.0)?;
         Some(all.swap_remove(own))
     }
@@ -99,7 +99,7 @@ impl Drop for Temporary {
 /// Removes what this process has not finished: for its end by a signal, or for want of memory.
 pub fn remove_temporary() {
     // Where another thread holds the list, or the end came while it grew, nothing is done: the names say what they are.
-    let Ok(mut all) = TEMPORARY.try_lock() else { return };
+    let Ok(mut all) = TEMPORARY_PATHS.try_lock() else { return };
     all.drain(..).for_each(|(path, made)| remove(&path, made.as_deref()));
 }
 

@@ -4,6 +4,7 @@
 //! What changes the shape is applied: morph targets at their weights, then skins in the pose of their joint nodes; quantised and
 //! sparse accessors are read, compressed ones refused by name. Materials and animations are read over.
 
+mod affine;
 mod buffers;
 mod document;
 mod seams;
@@ -13,15 +14,13 @@ mod write;
 pub use write::{SceneMesh, encode_glb, save_glb};
 
 use super::polygon_mesh::{PolygonMesh, check_count};
+use affine::{from_columns, is_mirrored, product};
 use buffers::{Buffers, DECOMPRESS};
-use document::{Document, Header, Node, Primitive};
+use clothcombo_physics::transform::{IDENTITY, Transform, apply};
+use document::{GltfDocument, GltfHeader, GltfNode, Primitive};
 use skin::Joints;
 use std::collections::HashMap;
 use std::path::Path;
-
-type Affine = [[f64; 4]; 3];
-
-const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 /// Extensions that compress meshes.
 const COMPRESSIONS: [&str; 3] =
@@ -43,7 +42,7 @@ const HARMLESS: [&str; 8] = [
 ];
 
 /// Why a document cannot be read as it is meant: what it needs is not known.
-fn unknown_extension(document: &Document) -> Option<String> {
+fn unknown_extension(document: &GltfDocument) -> Option<String> {
     let required = || document.extensions_required.iter();
     if let Some(name) = required().find(|name| COMPRESSIONS.contains(&name.as_str())) {
         return Some(format!("needs the extension {name}: {DECOMPRESS}"));
@@ -59,11 +58,11 @@ fn unknown_extension(document: &Document) -> Option<String> {
 pub(super) fn parse(bytes: &[u8], path: &Path, only: Option<&str>) -> Result<PolygonMesh, String> {
     let (json, chunk) = if bytes.starts_with(b"glTF") { binary_chunks(bytes)? } else { (bytes, None) };
     // The first version has other types everywhere.
-    let header: Header = serde_json::from_slice(json).map_err(|e| format!("glTF JSON: {e}"))?;
+    let header: GltfHeader = serde_json::from_slice(json).map_err(|e| format!("glTF JSON: {e}"))?;
     if header.asset.version.starts_with("1.") {
         return Err(format!("glTF version {}; only version 2 is known", header.asset.version));
     }
-    let document: Document = serde_json::from_slice(json).map_err(|e| format!("glTF JSON: {e}"))?;
+    let document: GltfDocument = serde_json::from_slice(json).map_err(|e| format!("glTF JSON: {e}"))?;
     if let Some(why) = unknown_extension(&document) {
         return Err(why);
     }
@@ -88,12 +87,12 @@ pub(super) fn parse(bytes: &[u8], path: &Path, only: Option<&str>) -> Result<Pol
         let node = node.map(|node| &document.nodes[node]);
         let weights = node.and_then(|node| node.weights.as_ref()).unwrap_or(&source.weights);
         let skin = node.and_then(|node| node.skin);
-        let joints = skin.map(|skin| Joints::new(&document, &mut buffers, skin, &worlds)).transpose()?;
+        let joints = skin.map(|skin| Joints::new(&mut buffers, skin, &worlds)).transpose()?;
         let shape = Shape { weights, place: &place, joints: joints.as_ref() };
         // Primitives of one mesh often share their vertices: first vertex and number of those of an accessor.
         let mut vertices: HashMap<usize, (u32, u32)> = HashMap::new();
         for (number, primitive) in source.primitives.iter().enumerate() {
-            add_primitive(primitive, &document, &mut buffers, &shape, &mut vertices, &mut mesh)
+            add_primitive(primitive, &mut buffers, &shape, &mut vertices, &mut mesh)
                 .map_err(|message| format!("mesh {mesh_index}, primitive {number}: {message}"))?;
         }
     }
@@ -134,11 +133,11 @@ fn binary_chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
 struct PlacedMesh {
     mesh: usize,
     node: Option<usize>,
-    place: Affine,
+    place: Transform,
 }
 
 impl PlacedMesh {
-    fn is_named(&self, name: &str, document: &Document) -> bool {
+    fn is_named(&self, name: &str, document: &GltfDocument) -> bool {
         let mesh = document.meshes.get(self.mesh).map(|mesh| &mesh.name);
         let node = self.node.map(|node| &document.nodes[node].name);
         mesh.into_iter().chain(node).any(|found| found.eq_ignore_ascii_case(name))
@@ -147,7 +146,7 @@ impl PlacedMesh {
 
 /// The meshes of the default scene with their world transforms, and those of all nodes; without scenes those of all root nodes,
 /// without nodes all.
-fn placed_meshes(document: &Document) -> Result<(Vec<PlacedMesh>, Vec<Affine>), String> {
+fn placed_meshes(document: &GltfDocument) -> Result<(Vec<PlacedMesh>, Vec<Transform>), String> {
     let nodes = &document.nodes;
     let mut worlds = vec![IDENTITY; nodes.len()];
     if nodes.is_empty() {
@@ -169,7 +168,7 @@ fn placed_meshes(document: &Document) -> Result<(Vec<PlacedMesh>, Vec<Affine>), 
     };
     let mut visited = vec![false; nodes.len()];
     let mut placed = Vec::new();
-    let mut stack: Vec<(usize, Affine)> = roots.iter().rev().map(|n| (*n, IDENTITY)).collect();
+    let mut stack: Vec<(usize, Transform)> = roots.iter().rev().map(|n| (*n, IDENTITY)).collect();
     while let Some((index, parent)) = stack.pop() {
         let node = nodes.get(index).ok_or_else(|| format!("node {index} of {} is named", nodes.len()))?;
         if std::mem::replace(&mut visited[index], true) {
@@ -187,10 +186,9 @@ fn placed_meshes(document: &Document) -> Result<(Vec<PlacedMesh>, Vec<Affine>), 
     Ok((placed, worlds))
 }
 
-fn local_transform(node: &Node) -> Affine {
-    if let Some(m) = node.matrix {
-        // Stored by columns.
-        return std::array::from_fn(|r| std::array::from_fn(|c| m[4 * c + r]));
+fn local_transform(node: &GltfNode) -> Transform {
+    if let Some(m) = &node.matrix {
+        return from_columns(m);
     }
     let [x, y, z, w] = node.rotation;
     let r = [
@@ -202,31 +200,11 @@ fn local_transform(node: &Node) -> Affine {
     std::array::from_fn(|a| [r[a][0] * s[0], r[a][1] * s[1], r[a][2] * s[2], t[a]])
 }
 
-fn product(a: &Affine, b: &Affine) -> Affine {
-    std::array::from_fn(|r| {
-        std::array::from_fn(|c| {
-            let linear: f64 = (0..3).map(|k| a[r][k] * b[k][c]).sum();
-            if c == 3 { linear + a[r][3] } else { linear }
-        })
-    })
-}
-
-fn transform(m: &Affine, p: [f64; 3]) -> [f64; 3] {
-    m.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
-}
-
-fn is_mirrored(m: &Affine) -> bool {
-    let [a, b, c] = m;
-    let determinant = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
-        + a[2] * (b[0] * c[1] - b[1] * c[0]);
-    determinant < 0.0
-}
-
 /// What happens to the vertices of a mesh.
 struct Shape<'a> {
     /// Of its morph targets.
     weights: &'a [f64],
-    place: &'a Affine,
+    place: &'a Transform,
     joints: Option<&'a Joints>,
 }
 
@@ -236,13 +214,12 @@ impl Shape<'_> {
         &self,
         primitive: &Primitive,
         accessor: usize,
-        document: &Document,
         buffers: &mut Buffers,
     ) -> Result<Vec<[f64; 3]>, String> {
-        let mut positions: Vec<[f64; 3]> = buffers.numbers(document, accessor)?;
+        let mut positions: Vec<[f64; 3]> = buffers.numbers(accessor)?;
         for (target, weight) in primitive.targets.iter().zip(self.weights).filter(|(_, w)| **w != 0.0) {
             let Some(moves) = target.get("POSITION") else { continue };
-            let moves: Vec<[f64; 3]> = buffers.numbers(document, *moves)?;
+            let moves: Vec<[f64; 3]> = buffers.numbers(*moves)?;
             if moves.len() != positions.len() {
                 return Err(format!("a morph target has {} of {} vertices", moves.len(), positions.len()));
             }
@@ -251,16 +228,15 @@ impl Shape<'_> {
             }
         }
         if let Some(joints) = self.joints {
-            joints.skin(primitive, document, buffers, &mut positions)?;
+            joints.skin(primitive, buffers, &mut positions)?;
         }
-        positions.iter_mut().for_each(|p| *p = transform(self.place, *p));
+        positions.iter_mut().for_each(|p| *p = apply(self.place, *p));
         Ok(positions)
     }
 }
 
 fn add_primitive(
     primitive: &Primitive,
-    document: &Document,
     buffers: &mut Buffers,
     shape: &Shape,
     vertices: &mut HashMap<usize, (u32, u32)>,
@@ -276,12 +252,12 @@ fn add_primitive(
         Some(known) => *known,
         None => {
             let base = mesh.positions.len();
-            let positions = shape.positions(primitive, accessor, document, buffers)?;
+            let positions = shape.positions(primitive, accessor, buffers)?;
             check_count("vertices", base + positions.len())?;
             let own = (base as u32, positions.len() as u32);
             let texture = primitive.attributes.get("TEXCOORD_0");
             // Coordinates that cannot be read are no reason to refuse a mesh.
-            let texture = texture.and_then(|accessor| buffers.texture(document, *accessor, positions.len()));
+            let texture = texture.and_then(|accessor| buffers.texture(*accessor, positions.len()));
             match texture {
                 Some(texture) => {
                     mesh.texture.resize(base, [0.0; 2]);
@@ -297,8 +273,8 @@ fn add_primitive(
         }
     };
     let indices: Vec<u32> = match primitive.indices {
-        Some(accessor) => buffers.indices(document, accessor)?,
-        None => (0..document.accessors[accessor].count as u32).collect(),
+        Some(accessor) => buffers.indices(accessor)?,
+        None => (0..buffers.document.accessors[accessor].count as u32).collect(),
     };
     if let Some(index) = indices.iter().find(|i| **i >= count) {
         return Err(format!("names vertex {index}, but has {count} vertices"));

@@ -8,9 +8,6 @@ use super::{gltf, ply, stl};
 use clothcombo_physics::mesh::TriMesh;
 use std::path::Path;
 
-/// Extensions of the mesh formats, lower case.
-pub const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "gltf", "glb"];
-
 /// A mesh file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeshFormat {
@@ -33,22 +30,25 @@ impl MeshFormat {
         if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
             return Some(Self::Ply);
         }
+        let is_stl = || stl::is_binary(bytes) || bytes.starts_with(b"solid ");
+        Self::of_extension(path).or_else(|| is_stl().then_some(Self::Stl))
+    }
+
+    fn of_extension(path: &Path) -> Option<Self> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
         match extension.as_str() {
             "obj" => Some(Self::Obj),
             "ply" => Some(Self::Ply),
             "stl" => Some(Self::Stl),
             "gltf" | "glb" => Some(Self::Gltf),
-            _ if stl::is_binary(bytes) || bytes.starts_with(b"solid ") => Some(Self::Stl),
             _ => None,
         }
     }
 }
 
-/// Whether the extension of `path` is one of [`MESH_EXTENSIONS`].
+/// Whether the extension of `path` is that of a mesh format.
 pub fn is_mesh_path(path: &Path) -> bool {
-    let extension = path.extension().and_then(|e| e.to_str());
-    extension.is_some_and(|e| MESH_EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(e)))
+    MeshFormat::of_extension(path).is_some()
 }
 
 /// Reads a mesh file of any known format; the content decides where it is unmistakable, the extension otherwise.
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
     use crate::asset::{Body, BodyFileSettings, Motion};
     use crate::folders::{load_garment_folder, load_motion_folder};
-    use crate::format::{MatFile, PointCache};
+    use crate::format::MatFile;
     use crate::generate::mannequin;
     use crate::import::bvh;
     use std::error::Error;
@@ -111,13 +111,12 @@ mod tests {
     fn no_error_names_its_cause_twice() {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("missing.obj");
-        let errors: [Box<dyn Error>; 8] = [
+        let errors: [Box<dyn Error>; 7] = [
             load_mesh(&missing).unwrap_err().into(),
             Body::load(&missing, &BodyFileSettings::default()).unwrap_err().into(),
             Motion::load(&missing).unwrap_err().into(),
             bvh::load(&missing).unwrap_err().into(),
             MatFile::load(&missing).unwrap_err().into(),
-            PointCache::load(&missing).unwrap_err().into(),
             load_garment_folder(&missing, &mannequin()).unwrap_err().into(),
             load_motion_folder(&missing).unwrap_err().into(),
         ];

@@ -63,10 +63,10 @@ pub struct MatFile {
     pub variables: Vec<(String, MatValue)>,
 }
 
-const HEADER: usize = 128;
+const MAT_HEADER: usize = 128;
 /// Metadata files are small; whatever decompresses to more than this is an attack or a mistake (bytes).
-const LARGEST: u64 = 1 << 28;
-const DEEPEST: usize = 32;
+const LARGEST_MAT_FILE: u64 = 1 << 28;
+const DEEPEST_NESTING: usize = 32;
 /// Codes of the data types ("mi…" in the format's description).
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
@@ -80,7 +80,7 @@ impl MatFile {
         let failed = FileError::io(path);
         let file = fs::File::open(path).map_err(&failed)?;
         let mut bytes = Vec::new();
-        file.take(LARGEST + 1).read_to_end(&mut bytes).map_err(failed)?;
+        file.take(LARGEST_MAT_FILE + 1).read_to_end(&mut bytes).map_err(failed)?;
         Self::parse(&bytes, path)
     }
 
@@ -91,20 +91,20 @@ impl MatFile {
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, FileError> {
         let wrong = FileError::content(path);
         let not = |reason: &str| wrong(format!("not a MAT-5 file ({reason})"));
-        if bytes.len() as u64 > LARGEST {
+        if bytes.len() as u64 > LARGEST_MAT_FILE {
             return Err(not("larger than 256 MiB"));
         }
         if bytes.starts_with(b"\x89HDF") || bytes.starts_with(b"MATLAB 7.3") {
             return Err(not("it is a version 7.3 file, that is HDF5; save it again with -v7"));
         }
-        let big = match bytes.get(126..HEADER) {
+        let big = match bytes.get(126..MAT_HEADER) {
             Some(b"IM") => false,
             Some(b"MI") => true,
             _ => return Err(not("it has no level-5 header; a level-4 file must be saved again with -v7")),
         };
-        let mut budget = LARGEST;
+        let mut budget = LARGEST_MAT_FILE;
         let mut file = Self::default();
-        let mut rest = Reader { bytes: &bytes[HEADER..], big };
+        let mut rest = MatReader { bytes: &bytes[MAT_HEADER..], big };
         while !rest.bytes.is_empty() {
             let number = file.variables.len() + 1;
             let damaged = |(name, reason): (String, String)| {
@@ -117,14 +117,14 @@ impl MatFile {
             let inflated;
             let (kind, data) = if kind == COMPRESSED {
                 inflated = inflate(data, &mut budget).map_err(unnamed)?;
-                Reader { bytes: &inflated, big }.element().map_err(unnamed)?
+                MatReader { bytes: &inflated, big }.element().map_err(unnamed)?
             } else {
                 (kind, data)
             };
             if kind != MATRIX {
                 return Err(unnamed(format!("its data type is {kind}, expected a matrix")));
             }
-            let variable = matrix(Reader { bytes: data, big }, 0).map_err(damaged)?;
+            let variable = matrix(MatReader { bytes: data, big }, 0).map_err(damaged)?;
             file.variables.push(variable);
         }
         Ok(file)
@@ -145,12 +145,12 @@ fn inflate(data: &[u8], budget: &mut u64) -> Result<Vec<u8>, String> {
 
 /// A stretch of tagged data elements.
 #[derive(Clone, Copy)]
-struct Reader<'a> {
+struct MatReader<'a> {
     bytes: &'a [u8],
     big: bool,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> MatReader<'a> {
     fn u32_at(&self, at: usize) -> Result<u32, String> {
         let cell: [u8; 4] = (self.bytes.get(at..at + 4).and_then(|b| b.try_into().ok()))
             .ok_or_else(|| "truncated in the middle of a tag".to_string())?;
@@ -208,7 +208,7 @@ fn numbers(kind: u32, data: &[u8], big: bool) -> Result<Vec<f64>, String> {
 }
 
 /// Name and value of a matrix element. The error carries the name, as far as it was read.
-fn matrix(mut reader: Reader<'_>, depth: usize) -> Result<(String, MatValue), (String, String)> {
+fn matrix(mut reader: MatReader<'_>, depth: usize) -> Result<(String, MatValue), (String, String)> {
     // An element without content is MATLAB's empty matrix.
     if reader.bytes.is_empty() {
         return Ok((String::new(), MatValue::Numbers(Array { shape: vec![0, 0], data: Vec::new() })));
@@ -228,14 +228,14 @@ fn matrix(mut reader: Reader<'_>, depth: usize) -> Result<(String, MatValue), (S
 }
 
 fn content(
-    mut reader: Reader<'_>,
+    mut reader: MatReader<'_>,
     class: u32,
     shape: Vec<usize>,
     count: usize,
     depth: usize,
 ) -> Result<MatValue, String> {
-    if depth > DEEPEST {
-        return Err(format!("nested more than {DEEPEST} levels deep"));
+    if depth > DEEPEST_NESTING {
+        return Err(format!("nested more than {DEEPEST_NESTING} levels deep"));
     }
     Ok(match class {
         1 => {
@@ -247,7 +247,7 @@ fn content(
             if names.is_empty() {
                 return Ok(MatValue::Struct(vec![Vec::new(); count.min(1)]));
             }
-            let element = |reader: &mut Reader<'_>| -> Result<Vec<(String, MatValue)>, String> {
+            let element = |reader: &mut MatReader<'_>| -> Result<Vec<(String, MatValue)>, String> {
                 let field = |n: &String| match nested(reader, depth) {
                     Ok(value) => Ok((n.clone(), value)),
                     Err(reason) => Err(format!("field '{n}': {reason}")),
@@ -276,17 +276,17 @@ fn content(
     })
 }
 
-fn nested(reader: &mut Reader<'_>, depth: usize) -> Result<MatValue, String> {
+fn nested(reader: &mut MatReader<'_>, depth: usize) -> Result<MatValue, String> {
     let (kind, data) = reader.element()?;
     if kind != MATRIX {
         return Err(format!("its data type is {kind}, expected a matrix"));
     }
-    matrix(Reader { bytes: data, big: reader.big }, depth + 1)
+    matrix(MatReader { bytes: data, big: reader.big }, depth + 1)
         .map(|(_, value)| value)
         .map_err(|(_, reason)| reason)
 }
 
-fn field_names(reader: &mut Reader<'_>) -> Result<Vec<String>, String> {
+fn field_names(reader: &mut MatReader<'_>) -> Result<Vec<String>, String> {
     let width = reader.numbers()?.first().copied().unwrap_or(0.0);
     let (_, data) = reader.element()?;
     if !(1.0..=4096.0).contains(&width) {

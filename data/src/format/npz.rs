@@ -28,13 +28,13 @@ pub struct Array<T> {
 /// An open npz archive.
 pub struct NpzFile {
     path: PathBuf,
-    archive: ZipArchive<Box<dyn Source>>,
+    archive: ZipArchive<Box<dyn ArchiveSource>>,
 }
 
 /// What an archive is read from.
-trait Source: Read + Seek + Send {}
+trait ArchiveSource: Read + Seek + Send {}
 
-impl<T: Read + Seek + Send> Source for T {}
+impl<T: Read + Seek + Send> ArchiveSource for T {}
 
 struct RawArray {
     kind: TypeStr,
@@ -61,7 +61,7 @@ impl NpzFile {
         Self::read(path, Box::new(Cursor::new(bytes)))
     }
 
-    fn read(path: &Path, source: Box<dyn Source>) -> Result<Self, FileError> {
+    fn read(path: &Path, source: Box<dyn ArchiveSource>) -> Result<Self, FileError> {
         let archive = ZipArchive::new(source)
             .map_err(|e| {
                 FileError::content(path)(way_out(path).unwrap_or_else(|| {
@@ -136,6 +136,17 @@ impl NpzFile {
     /// An array has another shape than `expected`.
     pub fn wrong_shape(&self, key: &str, found: &[usize], expected: &str) -> FileError {
         self.wrong(format!("key '{key}' has shape {found:?}, expected {expected}"))
+    }
+
+    /// The numbers of `array`, which must be of this shape.
+    ///
+    /// # Errors
+    /// [`FileError`] naming file and key.
+    pub fn of_shape<T>(&self, key: &str, array: Array<T>, shape: &[usize]) -> Result<Vec<T>, FileError> {
+        match array.shape == shape {
+            true => Ok(array.data),
+            false => Err(self.wrong_shape(key, &array.shape, &format!("{shape:?}"))),
+        }
     }
 
     /// A numeric or boolean array, converted to `f64`. `hint` says what kind of file was expected, should the key be missing.
@@ -275,7 +286,7 @@ const LARGEST_TEXT: usize = 1 << 24;
 /// The header of an `.npy` member. Its text is looked at before it is parsed: it cannot be long or deeply nested, or else it
 /// exhausts memory or stack.
 fn read_header(member: &mut impl Read) -> std::io::Result<NpyHeader> {
-    const LONGEST: usize = 1 << 16;
+    const LONGEST_HEADER: usize = 1 << 16;
     const MOST_BRACKETS: usize = 64;
     let invalid = |reason: &str| std::io::Error::new(std::io::ErrorKind::InvalidData, reason.to_string());
     let mut start = [0u8; 12];
@@ -287,7 +298,7 @@ fn read_header(member: &mut impl Read) -> std::io::Result<NpyHeader> {
         length = u32::from_le_bytes([start[8], start[9], start[10], start[11]]) as usize;
         known = 12;
     }
-    if !start.starts_with(b"\x93NUMPY") || length > LONGEST {
+    if !start.starts_with(b"\x93NUMPY") || length > LONGEST_HEADER {
         return Err(invalid("it is not a NumPy array"));
     }
     let mut bytes = start[..known].to_vec();

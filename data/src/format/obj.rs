@@ -204,23 +204,8 @@ pub fn save_polygons<'a>(
     polygons: impl IntoIterator<Item = &'a [u32]>,
     comments: &[String],
 ) -> Result<(), FileError> {
-    let mut text = String::with_capacity(positions.len() * 64);
-    for comment in comments {
-        for line in comment.lines() {
-            let _ = writeln!(text, "# {line}");
-        }
-    }
-    for [x, y, z] in positions {
-        let _ = writeln!(text, "v {x:.7} {y:.7} {z:.7}");
-    }
-    for polygon in polygons {
-        text.push('f');
-        for corner in polygon {
-            let _ = write!(text, " {}", u64::from(*corner) + 1);
-        }
-        text.push('\n');
-    }
-    atomic::write(path, text.as_bytes()).map_err(FileError::io(path))
+    let corners = |polygon: &'a [u32]| polygon.iter().map(|vertex| (*vertex, None));
+    save_corners(path, positions, &[], polygons.into_iter().map(corners), comments)
 }
 
 /// As [`save`], with faces that came of a file's faces, and the texture coordinates that belong to that file's
@@ -235,6 +220,25 @@ pub fn save_file_faces(
     file: &PolygonMesh,
     comments: &[String],
 ) -> Result<(), FileError> {
+    let polygons: Vec<&[u32]> = file.polygons().collect();
+    let corners = |face: &FileFace| {
+        let polygon = polygons.get(face.face as usize).copied().unwrap_or_default();
+        let texture = |corner: u32| polygon.get(corner as usize).copied();
+        let known = |texture: &u32| file.texture.len() > *texture as usize;
+        let corners = face.corners.iter().map(|[vertex, corner]| (*vertex, texture(*corner).filter(known)));
+        corners.collect::<Vec<_>>()
+    };
+    save_corners(path, positions, &file.texture, faces.iter().map(corners), comments)
+}
+
+/// Writes faces of corners: vertex and, if it has any, texture coordinates, both 0-based.
+fn save_corners<C: IntoIterator<Item = (u32, Option<u32>)>>(
+    path: &Path,
+    positions: &[[f64; 3]],
+    texture: &[[f64; 2]],
+    faces: impl Iterator<Item = C>,
+    comments: &[String],
+) -> Result<(), FileError> {
     let mut text = String::with_capacity(positions.len() * 64);
     for line in comments.iter().flat_map(|comment| comment.lines()) {
         let _ = writeln!(text, "# {line}");
@@ -242,18 +246,15 @@ pub fn save_file_faces(
     for [x, y, z] in positions {
         let _ = writeln!(text, "v {x:.7} {y:.7} {z:.7}");
     }
-    for [u, v] in &file.texture {
+    for [u, v] in texture {
         let _ = writeln!(text, "vt {u:.6} {v:.6}");
     }
-    let polygons: Vec<&[u32]> = file.polygons().collect();
     for face in faces {
         text.push('f');
-        let polygon = polygons.get(face.face as usize).copied().unwrap_or_default();
-        for [vertex, corner] in &face.corners {
-            let _ = write!(text, " {}", u64::from(*vertex) + 1);
-            let named = polygon.get(*corner as usize).filter(|v| file.texture.len() > **v as usize);
-            if let Some(named) = named {
-                let _ = write!(text, "/{}", u64::from(*named) + 1);
+        for (vertex, texture) in face {
+            let _ = write!(text, " {}", u64::from(vertex) + 1);
+            if let Some(texture) = texture {
+                let _ = write!(text, "/{}", u64::from(texture) + 1);
             }
         }
         text.push('\n');

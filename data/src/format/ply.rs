@@ -29,7 +29,7 @@ struct Property {
 }
 
 #[derive(Debug)]
-struct Element {
+struct PlyElement {
     name: String,
     count: usize,
     properties: Vec<Property>,
@@ -121,16 +121,13 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
                 mesh.positions.reserve(element.count);
                 for row in 0..element.count {
                     let mut position = [0.0; 3];
-                    for (number, property) in element.properties.iter().enumerate() {
-                        if property.list.is_some() {
-                            skip_list(&mut values, property).map_err(|m| in_row(row, m))?;
-                            continue;
-                        }
-                        let value = values.next(property.scalar).map_err(|m| in_row(row, m))?;
+                    let take = |number: usize, value: f64| {
                         if let Some(a) = [x, y, z].iter().position(|p| *p == number) {
                             position[a] = value;
                         }
-                    }
+                        Ok(())
+                    };
+                    read_row(&mut values, element, take).map_err(|m| in_row(row, m))?;
                     mesh.positions.push(position);
                 }
             }
@@ -143,38 +140,24 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
                 has_faces = true;
                 let mut corners = Vec::new();
                 for row in 0..element.count {
-                    for (number, property) in element.properties.iter().enumerate() {
-                        match property.list {
-                            Some(list) if number == indices => {
-                                let n = values.length(list).map_err(|m| in_row(row, m))?;
-                                corners.clear();
-                                for _ in 0..n {
-                                    let v = values.next(property.scalar).map_err(|m| in_row(row, m))?;
-                                    if !(0.0..f64::from(u32::MAX)).contains(&v) || v.fract() != 0.0 {
-                                        return Err(in_row(row, format!("{v} is no vertex number")));
-                                    }
-                                    corners.push(v as u32);
-                                }
-                                mesh.push(&corners);
-                            }
-                            Some(_) => skip_list(&mut values, property).map_err(|m| in_row(row, m))?,
-                            None => {
-                                values.next(property.scalar).map_err(|m| in_row(row, m))?;
-                            }
+                    corners.clear();
+                    let take = |number: usize, value: f64| {
+                        if number != indices {
+                            return Ok(());
                         }
-                    }
+                        if !(0.0..f64::from(u32::MAX)).contains(&value) || value.fract() != 0.0 {
+                            return Err(format!("{value} is no vertex number"));
+                        }
+                        corners.push(value as u32);
+                        Ok(())
+                    };
+                    read_row(&mut values, element, take).map_err(|m| in_row(row, m))?;
+                    mesh.push(&corners);
                 }
             }
             _ => {
                 for row in 0..element.count {
-                    for property in &element.properties {
-                        match property.list {
-                            Some(_) => skip_list(&mut values, property).map_err(|m| in_row(row, m))?,
-                            None => {
-                                values.next(property.scalar).map_err(|m| in_row(row, m))?;
-                            }
-                        }
-                    }
+                    read_row(&mut values, element, |_, _| Ok(())).map_err(|m| in_row(row, m))?;
                 }
             }
         }
@@ -185,18 +168,25 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     Ok(mesh)
 }
 
-fn skip_list(values: &mut Values, property: &Property) -> Result<(), String> {
-    let n = values.length(property.list.unwrap_or(Scalar::U8))?;
-    for _ in 0..n {
-        values.next(property.scalar)?;
+/// Reads a row; `take` gets every value with the number of its property.
+fn read_row(
+    values: &mut Values,
+    element: &PlyElement,
+    mut take: impl FnMut(usize, f64) -> Result<(), String>,
+) -> Result<(), String> {
+    for (number, property) in element.properties.iter().enumerate() {
+        let count = property.list.map_or(Ok(1), |list| values.length(list))?;
+        for _ in 0..count {
+            take(number, values.next(property.scalar)?)?;
+        }
     }
     Ok(())
 }
 
 /// Encoding, elements, and where the values start.
-fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, usize), String> {
+fn header(bytes: &[u8]) -> Result<(Encoding, Vec<PlyElement>, usize), String> {
     let mut encoding = None;
-    let mut elements: Vec<Element> = Vec::new();
+    let mut elements: Vec<PlyElement> = Vec::new();
     let mut at = 0;
     for number in 1..=1000 {
         let end = bytes[at..].iter().take(1000).position(|b| *b == b'\n');
@@ -219,7 +209,7 @@ fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, usize), String> {
             }
             ["element", name, count] => {
                 let count = count.parse().map_err(|_| wrong(format!("'{count}' is not a count")))?;
-                elements.push(Element { name: name.into(), count, properties: Vec::new() });
+                elements.push(PlyElement { name: name.into(), count, properties: Vec::new() });
             }
             ["property", ref words @ ..] => {
                 let element = elements.last_mut().ok_or_else(|| wrong("property without element".into()))?;

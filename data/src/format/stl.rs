@@ -4,17 +4,17 @@ use super::polygon_mesh::{PolygonMesh, check_count};
 use std::collections::HashMap;
 
 /// Bytes before the triangles of a binary file: 80 of header, 4 of count.
-const HEADER: usize = 84;
+const STL_HEADER: usize = 84;
 /// Bytes of a binary triangle: normal, three corners, attribute.
 const TRIANGLE: usize = 50;
 
 /// Whether the size of the file is the one its count announces, which only binary files manage.
 pub(super) fn is_binary(bytes: &[u8]) -> bool {
-    announced(bytes).is_some_and(|n| n > 0 && bytes.len() == HEADER + TRIANGLE * n)
+    announced(bytes).is_some_and(|n| n > 0 && bytes.len() == STL_HEADER + TRIANGLE * n)
 }
 
 fn announced(bytes: &[u8]) -> Option<usize> {
-    let count = bytes.get(80..HEADER)?;
+    let count = bytes.get(80..STL_HEADER)?;
     Some(u32::from_le_bytes([count[0], count[1], count[2], count[3]]) as usize)
 }
 
@@ -24,19 +24,20 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     if !is_binary(bytes) && bytes[text_start..].starts_with(b"solid") {
         return ascii(bytes);
     }
-    let count = announced(bytes)
-        .ok_or_else(|| format!("{} bytes are no STL: binary ones have a header of {HEADER}", bytes.len()))?;
+    let count = announced(bytes).ok_or_else(|| {
+        format!("{} bytes are no STL: binary ones have a header of {STL_HEADER}", bytes.len())
+    })?;
     // First of all: other files announce any number.
-    if bytes.len() != HEADER + TRIANGLE * count {
+    if bytes.len() != STL_HEADER + TRIANGLE * count {
         return Err(format!(
             "announces {count} triangles, which take {} bytes, but has {} (truncated, or no STL?)",
-            HEADER + TRIANGLE * count,
+            STL_HEADER + TRIANGLE * count,
             bytes.len()
         ));
     }
     check_count("faces", count)?;
-    let mut welded = Welded::default();
-    for triangle in bytes[HEADER..].chunks_exact(TRIANGLE) {
+    let mut welded = WeldedTriangles::default();
+    for triangle in bytes[STL_HEADER..].chunks_exact(TRIANGLE) {
         let number = |i: usize| {
             let at = 12 + 4 * i;
             f32::from_le_bytes([triangle[at], triangle[at + 1], triangle[at + 2], triangle[at + 3]])
@@ -48,7 +49,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
 
 fn ascii(bytes: &[u8]) -> Result<PolygonMesh, String> {
     let text = String::from_utf8_lossy(bytes);
-    let mut welded = Welded::default();
+    let mut welded = WeldedTriangles::default();
     let mut corners: Vec<[f64; 3]> = Vec::new();
     for (number, line) in text.lines().enumerate() {
         let wrong = |message: String| format!("line {}: {message}", number + 1);
@@ -86,12 +87,12 @@ fn ascii(bytes: &[u8]) -> Result<PolygonMesh, String> {
 
 /// Triangles whose equal corners are one vertex.
 #[derive(Default)]
-struct Welded {
+struct WeldedTriangles {
     mesh: PolygonMesh,
     known: HashMap<[u64; 3], u32>,
 }
 
-impl Welded {
+impl WeldedTriangles {
     fn push(&mut self, triangle: [[f64; 3]; 3]) {
         let corners = triangle.map(|p| {
             // −0 and 0 are one place.

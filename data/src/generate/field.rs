@@ -15,12 +15,12 @@ pub(crate) fn smooth_step(from: f64, to: f64, x: f64) -> f64 {
 
 /// Forward-difference gradient together with the value.
 pub(crate) fn gradient(field: impl Fn([f64; 3]) -> f64, p: [f64; 3]) -> (f64, [f64; 3]) {
-    const STEP: f64 = 1e-5;
+    const GRADIENT_STEP: f64 = 1e-5;
     let value = field(p);
     let slope = std::array::from_fn(|axis| {
         let mut q = p;
-        q[axis] += STEP;
-        (field(q) - value) / STEP
+        q[axis] += GRADIENT_STEP;
+        (field(q) - value) / GRADIENT_STEP
     });
     (value, slope)
 }

@@ -6,7 +6,7 @@ pub mod mannequin;
 mod parts;
 pub mod pose;
 
-pub use garment::{GarmentDesign, GarmentError, GarmentGenerator, GarmentSettings};
+pub use garment::{GarmentError, GarmentGenerator};
 pub use mannequin::mannequin;
 pub use pose::{
     LimbDensity, POSE_NAMES, PoseAugmentation, PoseSampler, SelfContact, named_pose, uniform_pose,

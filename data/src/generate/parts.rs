@@ -6,10 +6,8 @@ use crate::asset::{BODY_JOINT_COUNT, Body};
 pub(super) fn dominant_joints(body: &Body) -> Vec<usize> {
     (0..body.vertex_count())
         .map(|v| {
-            let (joints, weights) = body.skin_weights.row(v);
-            let heaviest =
-                joints.iter().zip(weights).max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(j, _)| *j);
-            let mut joint = usize::from(heaviest);
+            let heaviest = body.skin_weights.of_vertex(v).max_by(|a, b| a.1.total_cmp(&b.1));
+            let mut joint = heaviest.map_or(0, |(joint, _)| joint);
             while joint >= BODY_JOINT_COUNT {
                 match body.parents.get(joint).copied().flatten() {
                     Some(parent) => joint = parent,

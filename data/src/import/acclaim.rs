@@ -3,6 +3,7 @@
 
 mod motion;
 mod skeleton;
+mod words;
 
 use super::find_files::find_files;
 use super::motions::{RetargetSettings, write_retargeted};
@@ -11,7 +12,7 @@ use super::summary::{ImportError, Progress, Summary};
 use crate::asset::Body;
 use crate::asset::motion::check_frame_rate;
 use crate::format::{FileError, folder};
-use skeleton::Skeleton;
+use skeleton::AcclaimSkeleton;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -20,16 +21,10 @@ use std::path::{Path, PathBuf};
 pub struct AmcSettings {
     /// What all retargeted motions share.
     pub retarget: RetargetSettings,
-    /// Frame rate of the motions, whose files do not say it (frames/s). Default 120, that of the CMU database.
+    /// Frame rate of the motions, whose files do not say it (frames/s). That of the CMU database is 120.
     pub rate: f64,
     /// The skeleton of all motions; `None` takes the one beside each.
     pub skeleton: Option<PathBuf>,
-}
-
-impl Default for AmcSettings {
-    fn default() -> Self {
-        Self { retarget: RetargetSettings::default(), rate: 120.0, skeleton: None }
-    }
 }
 
 /// Imports AMC files, and those that are found in folders, as motion npz files in the folder `out`, retargeted to `body`. The
@@ -68,7 +63,7 @@ pub fn load(skeleton: &Path, motion: &Path, rate: f64) -> Result<Recording, File
     let text = |path: &Path| -> Result<String, FileError> {
         Ok(String::from_utf8_lossy(&fs::read(path).map_err(FileError::io(path))?).into_owned())
     };
-    let bones = Skeleton::parse(&text(skeleton)?, skeleton)?;
+    let bones = AcclaimSkeleton::parse(&text(skeleton)?, skeleton)?;
     let values = motion::parse(&text(motion)?, motion, &bones)?;
     Ok(Recording::new(bones.joints(), rate, values))
 }
@@ -93,24 +88,6 @@ fn skeleton_beside(motion: &Path) -> Result<PathBuf, String> {
             parent.display()
         )),
     }
-}
-
-/// The lines of a text without their comments, in words and numbered from 1; empty ones are left out.
-fn lines(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
-    let numbered = text.lines().enumerate().map(|(n, line)| {
-        let words = line.split('#').next().unwrap_or_default().split_ascii_whitespace();
-        (n + 1, words.collect::<Vec<_>>())
-    });
-    numbered.filter(|(_, words)| !words.is_empty())
-}
-
-/// The finite numbers `words` are; `what` they are is for the message.
-fn numbers(words: &[&str], what: &str) -> Result<Vec<f64>, String> {
-    let number = |word: &&str| match word.parse::<f64>() {
-        Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(format!("'{word}' is not a finite number ({what})")),
-    };
-    words.iter().map(number).collect()
 }
 
 #[cfg(test)]

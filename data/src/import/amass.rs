@@ -6,10 +6,10 @@
 //! here; whoever samples poses removes it.
 
 use super::find_files::find_files;
-use super::motions::{Clip, NamedFile, named, short, stem, write_motions};
+use super::motions::{named, short, stem, write_motions};
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
-use super::up_axis::{UpAxis, undecided};
+use super::up_axis::{WorldUp, undecided};
 use crate::asset::motion::{MotionFile, check_frame_rate, holds_poses, mean_up};
 use crate::asset::{Motion, Provenance};
 use crate::check::impossible_turn;
@@ -23,7 +23,7 @@ pub struct AmassSettings {
     /// Which frames are kept.
     pub thinning: Thinning,
     /// The axis that is up in the files; `None` takes the one along which the bodies below an input stand on average.
-    pub up: Option<UpAxis>,
+    pub up: Option<WorldUp>,
     /// Frame rate of files without one (frames/s); a file with another one is refused.
     pub rate: Option<f64>,
 }
@@ -52,7 +52,7 @@ pub fn import_amass(
     settings: &AmassSettings,
     progress: Progress<'_>,
 ) -> Result<Summary, ImportError> {
-    let mut files: Vec<NamedFile> = Vec::new();
+    let mut files = Vec::new();
     let mut axes = HashMap::new();
     let mut notes = Vec::new();
     progress("looking for motions", 0, 1);
@@ -63,7 +63,7 @@ pub fn import_amass(
             notes.push(format!("{}: {} is up, as the bodies stand (--up)", input.display(), axis.name()));
         }
         axes.extend(found.iter().map(|path| (path.clone(), axis.clone())));
-        files.extend(found.into_iter().map(|path| NamedFile { name: clip_name(input, &path), path }));
+        files.extend(found.into_iter().map(|path| (path.clone(), clip_name(input, &path))));
     }
     progress("looking for motions", 1, 1);
     if files.is_empty() {
@@ -71,9 +71,9 @@ pub fn import_amass(
         let where_ = if shown.is_empty() { String::new() } else { format!("{}: ", shown.join(", ")) };
         return Err(ImportError::Refused(format!("{where_}no {EXPECTED} found")));
     }
-    let files = named(files.into_iter().map(|f| (f.path, f.name)));
+    let files = named(files);
     let import = |file: &Path| {
-        let axis = axes.get(file).cloned().unwrap_or(Ok(UpAxis::Y));
+        let axis = axes.get(file).cloned().unwrap_or(Ok(WorldUp::Y));
         import_file(file, axis, settings)
     };
     let mut summary = write_motions(&files, None, out, EXPECTED, &import, progress)?;
@@ -88,7 +88,7 @@ pub fn import_amass(
 
 /// The axis along which the bodies in `files`, which come from one source, stand on average, or why it is not plain. A clip of
 /// somebody who lies on the floor is thus read as its neighbours are.
-fn standing_axis(files: &[PathBuf], rate: Option<f64>) -> Result<UpAxis, String> {
+fn standing_axis(files: &[PathBuf], rate: Option<f64>) -> Result<WorldUp, String> {
     let mut mean = [0.0; 3];
     let step = files.len().div_ceil(ASKED_FOR_UP).max(1);
     let readable = files.iter().step_by(step).filter_map(|file| MotionFile::read(file).ok());
@@ -105,9 +105,9 @@ fn standing_axis(files: &[PathBuf], rate: Option<f64>) -> Result<UpAxis, String>
     }
     // Files that cannot be read are refused one by one.
     if directions.is_empty() {
-        return Ok(UpAxis::Y);
+        return Ok(WorldUp::Y);
     }
-    UpAxis::of(mean).ok_or_else(|| undecided(mean))
+    WorldUp::of(mean).ok_or_else(|| undecided(mean))
 }
 
 /// The path below `root` with underscores, without what every file of AMASS ends in.
@@ -119,7 +119,11 @@ fn clip_name(root: &Path, path: &Path) -> String {
     folders.chain([stem.to_string()]).collect::<Vec<_>>().join("_")
 }
 
-fn import_file(path: &Path, up: Result<UpAxis, String>, settings: &AmassSettings) -> Result<Clip, String> {
+fn import_file(
+    path: &Path,
+    up: Result<WorldUp, String>,
+    settings: &AmassSettings,
+) -> Result<(Motion, String), String> {
     let mut file = NpzFile::open(path).map_err(|e| short(&e.to_string(), path))?;
     if !holds_poses(&file) {
         return Err(format!(
@@ -130,11 +134,9 @@ fn import_file(path: &Path, up: Result<UpAxis, String>, settings: &AmassSettings
     let subject = gender(&mut file);
     let own_source = Provenance::read(&mut file);
     drop(file);
-    let MotionFile { poses, rate, keys, joints, pickled, .. } = {
-        let file = MotionFile::read(path).map_err(|e| short(&e.to_string(), path))?;
-        MotionFile { rate: Some(("", file.frame_rate(settings.rate)?)), ..file }
-    };
-    let frame_rate = rate.map_or(f64::NAN, |(_, rate)| rate);
+    let file = MotionFile::read(path).map_err(|e| short(&e.to_string(), path))?;
+    let frame_rate = file.frame_rate(settings.rate)?;
+    let MotionFile { poses, keys, joints, pickled, .. } = file;
     let mut motion = Motion { name: stem(path), frame_rate, poses, source: own_source };
     motion.check()?;
     if motion.poses.is_empty() {
@@ -143,7 +145,7 @@ fn import_file(path: &Path, up: Result<UpAxis, String>, settings: &AmassSettings
     let up = up?;
     let (mean, uprightness) = (mean_up(&motion.poses), up.uprightness(&motion.poses));
     // Somebody may lie on the floor; but not stand along another axis, or on the head.
-    let stands_elsewhere = uprightness < 0.2 && UpAxis::of(mean).is_some_and(|axis| axis != up);
+    let stands_elsewhere = uprightness < 0.2 && WorldUp::of(mean).is_some_and(|axis| axis != up);
     motion.poses.iter_mut().for_each(|pose| up.turn_root_to_y_up(pose));
     let Thinned { poses, frame_rate, note } =
         thin(std::mem::take(&mut motion.poses), frame_rate, &settings.thinning);
@@ -168,7 +170,7 @@ fn import_file(path: &Path, up: Result<UpAxis, String>, settings: &AmassSettings
     if motion.source == Provenance::default() {
         motion.source = provenance(path, joints);
     }
-    Ok(Clip { motion, subject, note })
+    Ok((motion, note))
 }
 
 /// What a skeleton of so many joints is called.

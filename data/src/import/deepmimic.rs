@@ -16,9 +16,9 @@ use std::fs;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-const COLUMNS: usize = 44;
+const ROW_LENGTH: usize = 44;
 /// Column of the root's rotation.
-const ROOT: usize = 4;
+const ROOT_COLUMN: usize = 4;
 /// Lengths that a quaternion may have: the published clips hold interpolated ones from 0.58 to 1.12, which are normalised, as
 /// DeepMimic itself does.
 const LENGTHS: RangeInclusive<f64> = 0.5..=1.5;
@@ -42,51 +42,51 @@ const ROW: [(usize, bool, usize); 12] = [
 
 /// Joints that follow others: the lower spine (a third and two thirds of the chest's bend, which one joint of the character
 /// stands for), and half of the neck's.
-const SPINE: [usize; 2] = [13, 14];
-const NECK: usize = 15;
+const LOWER_SPINE: [usize; 2] = [13, 14];
+const LOWER_NECK: usize = 15;
 /// Wrists do not turn against the forearm; they are needed for its direction.
 const WRISTS: [usize; 2] = [16, 17];
-const JOINTS: usize = 18;
+const DEEPMIMIC_JOINT_COUNT: usize = 18;
 
 /// The character's joints at rest (m), in its own frame; only the limbs' directions matter.
-fn rest_positions() -> [[f64; 3]; JOINTS] {
-    const SHOULDER: [f64; 3] = [-0.024, 0.4797, 0.1831];
-    let mut rest = [[0.0; 3]; JOINTS];
+fn rest_positions() -> [[f64; 3]; DEEPMIMIC_JOINT_COUNT] {
+    const RIGHT_SHOULDER: [f64; 3] = [-0.024, 0.4797, 0.1831];
+    let mut rest = [[0.0; 3]; DEEPMIMIC_JOINT_COUNT];
     rest[1] = [0.0, 0.2362, 0.0];
     rest[2] = [0.0, 0.4601, 0.0];
     for (side, hip, shoulder, wrist) in [(1.0, 3, 6, WRISTS[1]), (-1.0, 8, 11, WRISTS[0])] {
         rest[hip] = [0.0, 0.0, side * 0.0849];
         rest[hip + 1] = [0.0, -0.4215, side * 0.0849];
         rest[hip + 2] = [0.0, -0.8314, side * 0.0849];
-        rest[shoulder] = [SHOULDER[0], SHOULDER[1], side * SHOULDER[2]];
-        rest[shoulder + 1] = [SHOULDER[0], SHOULDER[1] - 0.2748, side * SHOULDER[2]];
-        rest[wrist] = [SHOULDER[0], SHOULDER[1] - 0.5337, side * SHOULDER[2]];
+        rest[shoulder] = [RIGHT_SHOULDER[0], RIGHT_SHOULDER[1], side * RIGHT_SHOULDER[2]];
+        rest[shoulder + 1] = [RIGHT_SHOULDER[0], RIGHT_SHOULDER[1] - 0.2748, side * RIGHT_SHOULDER[2]];
+        rest[wrist] = [RIGHT_SHOULDER[0], RIGHT_SHOULDER[1] - 0.5337, side * RIGHT_SHOULDER[2]];
     }
     rest
 }
 
 #[rustfmt::skip]
 const MAP: JointMap = [
-    Some(0), Some(8), Some(3), Some(SPINE[0]), Some(9), Some(4), Some(SPINE[1]), Some(10), Some(5), Some(1),
-    None, None, Some(NECK), None, None, Some(2), Some(11), Some(6), Some(12), Some(7), Some(WRISTS[0]), Some(WRISTS[1]),
+    Some(0), Some(8), Some(3), Some(LOWER_SPINE[0]), Some(9), Some(4), Some(LOWER_SPINE[1]), Some(10), Some(5), Some(1),
+    None, None, Some(LOWER_NECK), None, None, Some(2), Some(11), Some(6), Some(12), Some(7), Some(WRISTS[0]), Some(WRISTS[1]),
 ];
 
 /// World rotations of all joints in one row.
-fn world_rotations(row: &[f64]) -> [Matrix3; JOINTS] {
+fn world_rotations(row: &[f64]) -> [Matrix3; DEEPMIMIC_JOINT_COUNT] {
     let turn = |column: usize| -> [f64; 3] {
         axis_angle_from_quaternion([row[column], row[column + 1], row[column + 2], row[column + 3]])
     };
-    let root = matrix_from_axis_angle(turn(ROOT));
-    let mut world = [root; JOINTS];
+    let root = matrix_from_axis_angle(turn(ROOT_COLUMN));
+    let mut world = [root; DEEPMIMIC_JOINT_COUNT];
     for (i, (column, hinge, parent)) in ROW.into_iter().enumerate() {
         let local = if hinge { [0.0, 0.0, row[column]] } else { turn(column) };
         world[i + 1] = product(&world[parent], &matrix_from_axis_angle(local));
     }
     let share = |column: usize, part: f64| matrix_from_axis_angle(turn(column).map(|x| x * part));
-    for (n, joint) in SPINE.into_iter().enumerate() {
+    for (n, joint) in LOWER_SPINE.into_iter().enumerate() {
         world[joint] = product(&root, &share(ROW[0].0, (n + 1) as f64 / 3.0));
     }
-    world[NECK] = product(&world[1], &share(ROW[1].0, 0.5));
+    world[LOWER_NECK] = product(&world[1], &share(ROW[1].0, 0.5));
     world[WRISTS[0]] = world[12];
     world[WRISTS[1]] = world[7];
     world
@@ -103,8 +103,11 @@ fn parse(text: &str) -> Result<Vec<Vec<f64>>, String> {
     let Text { frames } =
         serde_json::from_str(text).map_err(|e| format!("not a DeepMimic motion (JSON with Frames): {e}"))?;
     for (number, row) in frames.iter().enumerate() {
-        if row.len() != COLUMNS {
-            return Err(format!("frame {number} has {} numbers; a humanoid's row has {COLUMNS}", row.len()));
+        if row.len() != ROW_LENGTH {
+            return Err(format!(
+                "frame {number} has {} numbers; a humanoid's row has {ROW_LENGTH}",
+                row.len()
+            ));
         }
         if let Some(column) = row.iter().position(|x| !x.is_finite()) {
             return Err(format!("frame {number}, number {column} is not finite"));
@@ -117,7 +120,7 @@ fn parse(text: &str) -> Result<Vec<Vec<f64>>, String> {
             ));
         }
         let quaternions = ROW.iter().filter(|(_, hinge, _)| !hinge).map(|(column, _, _)| *column);
-        for column in quaternions.chain([ROOT]) {
+        for column in quaternions.chain([ROOT_COLUMN]) {
             let length = row[column..column + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
             if !LENGTHS.contains(&length) {
                 return Err(format!(
@@ -183,9 +186,9 @@ mod tests {
     use crate::generate::mannequin;
 
     fn rest_row() -> Vec<f64> {
-        let mut row = vec![0.0; COLUMNS];
+        let mut row = vec![0.0; ROW_LENGTH];
         row[0] = 1.0 / 30.0;
-        row[ROOT] = 1.0;
+        row[ROOT_COLUMN] = 1.0;
         ROW.iter().filter(|(_, hinge, _)| !hinge).for_each(|(column, _, _)| row[*column] = 1.0);
         row
     }

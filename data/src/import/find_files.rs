@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const DEEPEST: usize = 32;
+const DEEPEST_FOLDER: usize = 32;
 
 /// `input` itself if it is a file, else all files of this extension below it, in order of their names. Links that lead back are
 /// followed once. What was imported into `out` before is no input, unless `out` is what is asked for.
@@ -28,7 +28,7 @@ fn find(
         found.push(path.into());
         return Ok(());
     }
-    if depth > DEEPEST || !seen.insert(fs::canonicalize(path).map_err(&failed)?) {
+    if depth > DEEPEST_FOLDER || !seen.insert(fs::canonicalize(path).map_err(&failed)?) {
         return Ok(());
     }
     for entry in folder::entries(path)? {

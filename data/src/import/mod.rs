@@ -25,4 +25,4 @@ pub use overwrite::refuse_overwriting;
 pub use smpl_family::import_smpl_family;
 pub use summary::{ImportError, Progress, Summary};
 pub use thinning::Thinning;
-pub use up_axis::UpAxis;
+pub use up_axis::WorldUp;

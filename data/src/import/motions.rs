@@ -1,29 +1,13 @@
-//! What the motion importers share: names for clips, writing them, and the manifest `motions.toml` beside them.
-//!
-//! ```toml
-//! [[motion]]
-//! file = "CMU_01_01_01.npz"
-//! frames = 1240
-//! frame_rate = 30.0
-//! subject = "male"          # where the source says so
-//! source = "…"
-//! author = "…"
-//! licence = "…"
-//! ```
+//! What the motion importers share: names for clips, and writing them.
 
 use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
 use crate::asset::{Body, Motion, Pose, Provenance, skeleton::BODY_JOINT_COUNT};
 use crate::check::{impossible_turn, not_upright};
-use crate::format::{FileError, toml_file};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-
-/// Name of the manifest in a motion folder.
-pub const MANIFEST: &str = "motions.toml";
 
 /// How motions of other skeletons are imported.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,19 +67,9 @@ pub(super) fn write_retargeted(
         let Thinned { poses, frame_rate, note } = thin(poses, frame_rate, &settings.thinning);
         let source = provenance_of(file, &settings.provenance);
         let motion = Motion { name: String::new(), frame_rate, poses, source };
-        Ok(Clip { motion, subject: String::new(), note: format!("{skeleton}, {note}{remark}{warning}") })
+        Ok((motion, format!("{skeleton}, {note}{remark}{warning}")))
     };
     write_motions(&inputs, settings.body_file.as_deref(), out, expected, &import, progress)
-}
-
-/// A clip made from one file.
-pub(super) struct Clip {
-    /// The motion; its name is overwritten.
-    pub motion: Motion,
-    /// Gender or name of the person, empty where unknown.
-    pub subject: String,
-    /// A line about it.
-    pub note: String,
 }
 
 /// A file and the name its clip gets.
@@ -103,23 +77,6 @@ pub(super) struct Clip {
 pub(super) struct NamedFile {
     pub path: PathBuf,
     pub name: String,
-}
-
-#[derive(Default, Serialize, Deserialize)]
-struct Manifest {
-    #[serde(default)]
-    motion: Vec<Entry>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct Entry {
-    file: String,
-    frames: usize,
-    frame_rate: f64,
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    subject: String,
-    #[serde(flatten)]
-    source: Provenance,
 }
 
 /// Names clips after their files; equal names get a number.
@@ -157,21 +114,20 @@ fn provenance_of(file: &Path, given: &Provenance) -> Provenance {
     Provenance { source, ..given.clone() }
 }
 
-/// Imports each file with `import`, several at a time; writes the clips to `out` and records them in its manifest. What cannot
-/// be used is skipped with its reason. Nothing is written over an input, nor over `body_file`.
+/// Imports each file with `import`, which gives a motion and a line about it, several at a time, and writes the motions to `out`.
+/// What cannot be used is skipped with its reason. Nothing is written over an input, nor over `body_file`.
 pub(super) fn write_motions(
     inputs: &[NamedFile],
     body_file: Option<&Path>,
     out: &Path,
     expected: &str,
-    import: &(dyn Fn(&Path) -> Result<Clip, String> + Sync),
+    import: &(dyn Fn(&Path) -> Result<(Motion, String), String> + Sync),
     progress: Progress<'_>,
 ) -> Result<Summary, ImportError> {
     let written = |name: &str| out.join(format!("{name}.npz"));
-    let outputs = inputs.iter().map(|input| written(&input.name)).chain([out.join(MANIFEST)]);
+    let outputs = inputs.iter().map(|input| written(&input.name));
     refuse_overwriting(inputs.iter().map(|input| input.path.as_path()).chain(body_file), outputs)?;
     let mut summary = Summary::default();
-    let mut manifest = read_manifest(out)?;
     let (mut done, mut frames, mut seconds) = (0, 0, 0.0);
     for chunk in inputs.chunks(16) {
         let clips: Vec<_> = chunk.par_iter().map(|input| import(&input.path)).collect();
@@ -179,29 +135,17 @@ pub(super) fn write_motions(
             done += 1;
             progress("importing motions", done, inputs.len());
             // What no motion file may hold is not written either.
-            let valid = clip.and_then(|clip| clip.motion.check().map(|()| clip));
-            let Clip { mut motion, subject, note } = match valid {
-                Ok(clip) => clip,
-                Err(reason) => {
-                    summary.skipped.push((path.display().to_string(), reason));
-                    continue;
+            match clip.and_then(|(motion, note)| motion.check().map(|()| (motion, note))) {
+                Ok((motion, note)) => {
+                    let written = written(name);
+                    motion.save(&written)?;
+                    frames += motion.poses.len();
+                    seconds += motion.poses.len() as f64 / motion.frame_rate;
+                    summary.taken.push((name.clone(), note));
+                    summary.written.push(written);
                 }
-            };
-            motion.name = name.clone();
-            let (file, written) = (format!("{name}.npz"), written(name));
-            motion.save(&written)?;
-            frames += motion.poses.len();
-            seconds += motion.poses.len() as f64 / motion.frame_rate;
-            summary.taken.push((name.clone(), note));
-            summary.written.push(written);
-            manifest.motion.retain(|entry| entry.file != file);
-            manifest.motion.push(Entry {
-                file,
-                frames: motion.poses.len(),
-                frame_rate: motion.frame_rate,
-                subject,
-                source: motion.source,
-            });
+                Err(reason) => summary.skipped.push((path.display().to_string(), reason)),
+            }
         }
     }
     if let (Some((first, reason)), true) = (summary.skipped.first(), summary.taken.is_empty()) {
@@ -210,27 +154,10 @@ pub(super) fn write_motions(
             inputs.len()
         )));
     }
-    summary.written.push(write_manifest(out, manifest)?);
     summary.notes.push(format!(
         "{frames} frames ({:.1} minutes) in {} clips",
         seconds / 60.0,
         summary.taken.len()
     ));
     Ok(summary)
-}
-
-fn read_manifest(out: &Path) -> Result<Manifest, FileError> {
-    match toml_file::load(&out.join(MANIFEST)) {
-        Err(FileError::Content { path, message }) => {
-            Err(FileError::content(&path)(format!("{message}; remove it or choose another folder")))
-        }
-        manifest => Ok(manifest?.unwrap_or_default()),
-    }
-}
-
-fn write_manifest(out: &Path, mut manifest: Manifest) -> Result<PathBuf, FileError> {
-    let path = out.join(MANIFEST);
-    manifest.motion.sort_by(|a, b| a.file.cmp(&b.file));
-    toml_file::save(&path, &manifest)?;
-    Ok(path)
 }

@@ -15,7 +15,7 @@ pub use recording::{Channel, Recording, RigJoint};
 use super::motions::Retargeted;
 use super::retarget::{JointMap, Retarget};
 use super::thinning::largest_turn;
-use super::up_axis::UpAxis;
+use super::up_axis::WorldUp;
 use crate::asset::rotation::{IDENTITY, Matrix3, apply, product, transpose};
 use crate::asset::{Body, Pose};
 
@@ -74,7 +74,7 @@ pub(super) fn retarget(recording: &Recording, map: JointMap, joints: &[[f64; 3]]
 fn turns_to_y_up(recording: &Recording, map: &JointMap, rest: &[[f64; 3]]) -> (Matrix3, Matrix3) {
     let (Some(pelvis), Some(top)) = (map[0], map[15].or(map[12])) else { return (IDENTITY, IDENTITY) };
     let up: [f64; 3] = std::array::from_fn(|a| rest[top][a] - rest[pelvis][a]);
-    if UpAxis::of(up.map(|x| x / up.iter().map(|x| x * x).sum::<f64>().sqrt())) != Some(UpAxis::Z) {
+    if WorldUp::of(up.map(|x| x / up.iter().map(|x| x * x).sum::<f64>().sqrt())) != Some(WorldUp::Z) {
         return (IDENTITY, IDENTITY);
     }
     let mut mean = [0.0; 3];
@@ -82,7 +82,7 @@ fn turns_to_y_up(recording: &Recording, map: &JointMap, rest: &[[f64; 3]]) -> (M
         let direction = apply(&recording.world_rotations(frame)[pelvis], up);
         (0..3).for_each(|a| mean[a] += direction[a]);
     }
-    let turn = UpAxis::Z.to_y_up();
+    let turn = WorldUp::Z.to_y_up();
     (turn, if mean[1] > mean[2] { IDENTITY } else { turn })
 }
 

@@ -18,7 +18,7 @@ fn hint(models: &[PathBuf]) -> String {
 }
 
 /// A published model: its vertex and joint counts.
-struct Model {
+struct PublishedModel {
     name: &'static str,
     vertices: usize,
     joints: usize,
@@ -26,22 +26,22 @@ struct Model {
     licence: &'static str,
 }
 
-const MODELS: [Model; 3] = [
-    Model {
+const MODELS: [PublishedModel; 3] = [
+    PublishedModel {
         name: "SMPL",
         vertices: 6890,
         joints: 24,
         reference: "Loper et al. 2015, Max Planck Institute for Intelligent Systems",
         licence: "SMPL model licence; see https://smpl.is.tue.mpg.de",
     },
-    Model {
+    PublishedModel {
         name: "SMPL-H",
         vertices: 6890,
         joints: 52,
         reference: "Romero et al. 2017, Max Planck Institute for Intelligent Systems",
         licence: "MANO/SMPL-H model licence (non-commercial); see https://mano.is.tue.mpg.de",
     },
-    Model {
+    PublishedModel {
         name: "SMPL-X",
         vertices: 10475,
         joints: 55,
@@ -164,7 +164,7 @@ fn refuse_what_is_no_npz(input: &Path) -> Result<(), FileError> {
 }
 
 /// What the file says itself, or what is known of the published model.
-fn provenance(file: &mut NpzFile, model: Option<&Model>, input: &Path) -> Provenance {
+fn provenance(file: &mut NpzFile, model: Option<&PublishedModel>, input: &Path) -> Provenance {
     let own = Provenance::read(file);
     if own != Provenance::default() {
         return own;

@@ -20,7 +20,7 @@ pub struct Thinned {
     pub poses: Vec<Pose>,
     /// Rate of the frames but for the static ones (frames/s).
     pub frame_rate: f64,
-    /// What was kept of what: "120 of 243 frames at 60 frames/s (every 2nd, 2 static ones dropped)".
+    /// What was kept of what: "120 of 243 frames at 60 frames/s (one in 2, 2 static ones dropped)".
     pub note: String,
 }
 
@@ -50,7 +50,7 @@ fn note(count: usize, kept: usize, rate: f64, step: usize, static_frames: usize)
     let rate = rate.strip_suffix(".00").unwrap_or(&rate);
     let mut left_out = Vec::new();
     if step > 1 {
-        left_out.push(format!("every {step}{}", ordinal_ending(step)));
+        left_out.push(format!("one in {step}"));
     }
     if static_frames > 0 {
         let ones = if static_frames == 1 { "one" } else { "ones" };
@@ -59,16 +59,6 @@ fn note(count: usize, kept: usize, rate: f64, step: usize, static_frames: usize)
     match left_out.is_empty() {
         true => format!("{of} {frames} at {rate} frames/s"),
         false => format!("{of} {frames} at {rate} frames/s ({})", left_out.join(", ")),
-    }
-}
-
-fn ordinal_ending(number: usize) -> &'static str {
-    match (number % 10, number % 100) {
-        (_, 11..=13) => "th",
-        (1, _) => "st",
-        (2, _) => "nd",
-        (3, _) => "rd",
-        _ => "th",
     }
 }
 
@@ -119,16 +109,13 @@ mod tests {
             ((1, 1, 30.0, 1, 0), "1 frame at 30 frames/s"),
             (
                 (243, 120, 59.94, 2, 2),
-                "120 of 243 frames at 59.94 frames/s (every 2nd, 2 static ones dropped)",
+                "120 of 243 frames at 59.94 frames/s (one in 2, 2 static ones dropped)",
             ),
             ((12, 11, 30.0, 1, 1), "11 of 12 frames at 30 frames/s (1 static one dropped)"),
-            ((121, 31, 120.000045, 4, 0), "31 of 121 frames at 120 frames/s (every 4th)"),
+            ((121, 31, 120.000045, 4, 0), "31 of 121 frames at 120 frames/s (one in 4)"),
         ] {
             let (count, kept, rate, step, static_frames) = numbers;
             assert_eq!(note(count, kept, rate, step, static_frames), expected);
         }
-        let ordinals =
-            [1, 2, 3, 4, 11, 12, 13, 21, 22, 103, 112].map(|n| format!("{n}{}", ordinal_ending(n)));
-        assert_eq!(ordinals.join(" "), "1st 2nd 3rd 4th 11th 12th 13th 21st 22nd 103rd 112th");
     }
 }

@@ -1,6 +1,7 @@
 //! Polygons of any file → triangles over welded vertices, each remembering where it came from.
 
 use super::triangle::{smallest_sine, triangle_normal};
+use clothcombo_physics::mesh::DisjointSets;
 use clothcombo_physics::vec3::{cross, dot, norm, norm_squared, sub};
 use std::collections::{HashMap, HashSet};
 
@@ -31,6 +32,16 @@ pub fn compact(faces: impl IntoIterator<Item = [u32; 3]>, vertices: usize) -> (V
     };
     let faces = faces.into_iter().map(|face| face.map(&mut renumbered)).collect();
     (used, faces)
+}
+
+/// The vertices that faces hang together by.
+pub fn pieces<'a>(faces: impl IntoIterator<Item = &'a [u32; 3]>, vertices: usize) -> DisjointSets {
+    let mut pieces = DisjointSets::new(vertices);
+    for [a, b, c] in faces {
+        pieces.join(*a, *b);
+        pieces.join(*a, *c);
+    }
+    pieces
 }
 
 /// Length of the diagonal of the bounding box.

@@ -6,6 +6,7 @@
 //! The inside is what rays in two of three axis directions call inside, so that a small hole in a scanned body costs
 //! nothing.
 
+use super::clean::bounds;
 use super::isosurface::Lattice;
 use clothcombo_physics::vec3::{add, cross, dot, norm_squared, scale, sub};
 use std::collections::VecDeque;
@@ -32,14 +33,8 @@ impl DistanceGrid {
         band: f64,
         attribute: impl Fn(usize) -> f64,
     ) -> (Self, Self) {
-        let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
-        for p in positions {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(p[axis] - band - step);
-                high[axis] = high[axis].max(p[axis] + band + step);
-            }
-        }
-        let lattice = Lattice::covering(low, high, step);
+        let [low, high] = bounds(positions);
+        let lattice = Lattice::covering(low.map(|x| x - band - step), high.map(|x| x + band + step), step);
         let corners = |f: usize| faces[f].map(|v| positions[v as usize]);
         let mut nearest = vec![u32::MAX; lattice.len()];
         let mut squared = vec![band * band; lattice.len()];

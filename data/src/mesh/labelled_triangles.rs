@@ -3,9 +3,9 @@
 //! Each vertex carries a label: a bit set of the cut curves it lies on. Zero is an interior vertex, one bit a vertex of
 //! that boundary curve, several bits a corner where curves meet.
 
-use super::clean::compact;
-use clothcombo_physics::mesh::DisjointSets;
-use clothcombo_physics::vec3::{add, cross, norm, scale, sub};
+use super::clean::{compact, pieces};
+use super::triangle::triangle_normal;
+use clothcombo_physics::vec3::{add, norm, scale, sub};
 use std::collections::HashMap;
 
 /// Triangle soup with labels, the form in which surfaces are clipped.
@@ -94,15 +94,10 @@ impl LabelledTriangles {
 
     /// The connected component with the largest area, vertices renumbered.
     pub fn largest_component(&self) -> Self {
-        let mut components = DisjointSets::new(self.positions.len());
-        for [a, b, c] in &self.faces {
-            components.join(*a, *b);
-            components.join(*a, *c);
-        }
+        let mut components = pieces(&self.faces, self.positions.len());
         let mut area = vec![0.0; self.positions.len()];
         for face in &self.faces {
-            let [a, b, c] = face.map(|v| self.positions[v as usize]);
-            area[components.root(face[0]) as usize] += norm(cross(sub(b, a), sub(c, a)));
+            area[components.root(face[0]) as usize] += norm(self.normal(*face));
         }
         let Some(best) = (0..area.len()).max_by(|a, b| area[*a].total_cmp(&area[*b])) else {
             return Self::default();
@@ -119,12 +114,11 @@ impl LabelledTriangles {
 
     /// Surface area (m²).
     pub fn area(&self) -> f64 {
-        self.faces
-            .iter()
-            .map(|face| {
-                let [a, b, c] = face.map(|v| self.positions[v as usize]);
-                0.5 * norm(cross(sub(b, a), sub(c, a)))
-            })
-            .sum()
+        self.faces.iter().map(|face| 0.5 * norm(self.normal(*face))).sum()
+    }
+
+    /// Unnormalised normal (twice the area) of a face.
+    fn normal(&self, face: [u32; 3]) -> [f64; 3] {
+        triangle_normal(face.map(|v| self.positions[v as usize]))
     }
 }

@@ -10,7 +10,7 @@ use std::collections::{HashMap, VecDeque};
 pub type Joined = Vec<[Option<u32>; 3]>;
 
 /// An edge with more faces than this joins none of them: no surface looks like that, and comparing all pairs would not end.
-const CROWD: usize = 32;
+const CROWDED_EDGE: usize = 32;
 
 /// Joins faces along edges. Where more than two meet, the two that continue each other most smoothly stay joined and the others
 /// get edges of their own; those crowded edges are returned, sorted.
@@ -28,7 +28,7 @@ pub fn join_faces(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> (Joined, Vec<[u
         if uses.len() > 2 {
             crowded.push([a, b]);
         }
-        if uses.len() < 2 || uses.len() > CROWD {
+        if uses.len() < 2 || uses.len() > CROWDED_EDGE {
             continue;
         }
         // Direction from the edge into each face; two faces continue each other when these are opposite.

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 /// How far inside, how often.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Contact {
+pub struct BodyClearance {
     /// Vertices inside the body.
     pub inside: usize,
     /// Smallest gap of a vertex (m).
@@ -14,9 +14,9 @@ pub struct Contact {
 }
 
 /// How a mesh lies to a body.
-pub fn contact(positions: &[[f64; 3]], body: &Surface<f64>) -> Contact {
+pub fn contact(positions: &[[f64; 3]], body: &Surface<f64>) -> BodyClearance {
     let gaps: Vec<f64> = positions.par_iter().map(|p| body.gap(*p, Distance::ClosestPoint).gap).collect();
-    Contact {
+    BodyClearance {
         inside: gaps.iter().filter(|g| **g < 0.0).count(),
         least_gap: gaps.into_iter().fold(f64::MAX, f64::min),
     }
@@ -26,8 +26,8 @@ pub fn contact(positions: &[[f64; 3]], body: &Surface<f64>) -> Contact {
 /// displacement is smoothed over the garment, so that its neighbourhood comes along instead of leaving a dent.
 pub fn push_out(positions: &mut [[f64; 3]], faces: &[[u32; 3]], body: &Surface<f64>, clearance: f64) {
     let rings = one_rings(positions.len(), faces);
-    const ROUNDS: usize = 40;
-    for round in 0..ROUNDS {
+    const PUSH_ROUNDS: usize = 40;
+    for round in 0..PUSH_ROUNDS {
         let mut displacement: Vec<[f64; 3]> =
             positions.par_iter().map(|p| missing(*p, clearance, body)).collect();
         // Face centres: a large triangle can cut a bulge while its corners are outside.
@@ -55,9 +55,9 @@ pub fn push_out(positions: &mut [[f64; 3]], faces: &[[u32; 3]], body: &Surface<f
             return;
         }
         // Wide smoothing first, exact pushes last.
-        let smoothing = if round < ROUNDS / 4 {
+        let smoothing = if round < PUSH_ROUNDS / 4 {
             8
-        } else if round < ROUNDS / 2 {
+        } else if round < PUSH_ROUNDS / 2 {
             2
         } else {
             0

@@ -6,7 +6,7 @@
 
 use super::editable::{DEAD, EditableMesh};
 use super::triangle::smallest_sine;
-use clothcombo_physics::vec3::{add, dot, norm, norm_squared, normalized, scale, sub};
+use clothcombo_physics::vec3::{add, cross, dot, norm, norm_squared, normalized, scale, sub};
 use std::collections::VecDeque;
 
 /// The surface that remeshing has to keep to, and the edge length it should have.
@@ -100,17 +100,20 @@ fn split_edge(
     v
 }
 
+/// The edges whose length relative to the wanted one is as asked for, each with that ratio.
+fn edges_by_ratio(
+    sheet: &EditableMesh,
+    sizing: &Sizing,
+    is_wanted: impl Fn(f64) -> bool,
+) -> Vec<(f64, [u32; 2])> {
+    let edges = sheet.edges().into_iter().map(|[a, b]| (sizing.ratio(sheet, a, b), [a, b]));
+    edges.filter(|(ratio, _)| is_wanted(*ratio)).collect()
+}
+
 fn split_long_edges(sheet: &mut EditableMesh, target: &impl RemeshTarget) {
     let mut sizing = Sizing::new(sheet, target);
     for _ in 0..4 {
-        let mut long: Vec<(f64, [u32; 2])> = sheet
-            .edges()
-            .into_iter()
-            .filter_map(|[a, b]| {
-                let ratio = sizing.ratio(sheet, a, b);
-                (ratio > LONG).then_some((ratio, [a, b]))
-            })
-            .collect();
+        let mut long = edges_by_ratio(sheet, &sizing, |ratio| ratio > LONG);
         if long.is_empty() {
             break;
         }
@@ -184,14 +187,7 @@ fn collapse_short_edges(sheet: &mut EditableMesh, target: &impl RemeshTarget) {
     remove_three_valent(sheet);
     let sizing = Sizing::new(sheet, target);
     for _ in 0..6 {
-        let mut short: Vec<(f64, [u32; 2])> = sheet
-            .edges()
-            .into_iter()
-            .filter_map(|[a, b]| {
-                let ratio = sizing.ratio(sheet, a, b);
-                (ratio < SHORT).then_some((ratio, [a, b]))
-            })
-            .collect();
+        let mut short = edges_by_ratio(sheet, &sizing, |ratio| ratio < SHORT);
         short.sort_by(|p, q| p.0.total_cmp(&q.0));
         let mut collapsed = 0;
         for (_, [a, b]) in short {
@@ -341,8 +337,8 @@ fn improve(sheet: &mut EditableMesh, target: &impl RemeshTarget, v: u32) {
     let mut candidates: Vec<[f64; 3]> = relaxed(sheet, target, v).into_iter().collect();
     let normal = normalized(sheet.vertex_normal(v));
     let helper = if normal[0].abs() < 0.7 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-    let u = normalized(clothcombo_physics::vec3::cross(normal, helper));
-    let w = clothcombo_physics::vec3::cross(normal, u);
+    let u = normalized(cross(normal, helper));
+    let w = cross(normal, u);
     let reach = 0.25
         * sheet
             .incident(v)

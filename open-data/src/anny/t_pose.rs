@@ -1,132 +1,82 @@
 //! From the rig's A-pose to a T-pose: arms along ±x with palms down, legs straight and nearly vertical, toes forward.
 
-use super::rig::Rig;
-use clothcombo_data::asset::body::{skin, transform};
-use clothcombo_data::asset::rotation::{IDENTITY, Matrix3, apply, between, matrix_from_axis_angle, product};
+use super::rig::BaseRig;
+use clothcombo_data::asset::body::skin;
+use clothcombo_data::asset::rotation::{
+    IDENTITY, Matrix3, apply, between, matrix_from_axis_angle, product, rigid_motion,
+};
+use clothcombo_physics::transform;
+use clothcombo_physics::vec3::{add, sub};
 use rayon::prelude::*;
 
 /// Clavicles rise with the arms.
 const CLAVICLE_LIFT: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
-/// Joints of one side of SMPL-X: collar, shoulder, elbow, wrist, first index joint, hip, knee, ankle, foot.
-struct Side {
-    sign: f64,
-    collar: usize,
-    shoulder: usize,
-    elbow: usize,
-    wrist: usize,
-    hand: usize,
-    hip: usize,
-    knee: usize,
-    ankle: usize,
-    foot: usize,
-}
-
-const SIDES: [Side; 2] = [
-    Side {
-        sign: 1.0,
-        collar: 13,
-        shoulder: 16,
-        elbow: 18,
-        wrist: 20,
-        hand: 25,
-        hip: 1,
-        knee: 4,
-        ankle: 7,
-        foot: 10,
-    },
-    Side {
-        sign: -1.0,
-        collar: 14,
-        shoulder: 17,
-        elbow: 19,
-        wrist: 21,
-        hand: 40,
-        hip: 2,
-        knee: 5,
-        ankle: 8,
-        foot: 11,
-    },
-];
-
 /// Vertices and joints of a person in T-pose, pelvis at the origin.
-pub struct Posed {
+pub struct TPosed {
     pub positions: Vec<[f64; 3]>,
     pub joints: Vec<[f64; 3]>,
 }
 
 /// Re-poses one person's base mesh by linear blend skinning.
-pub fn t_pose(rig: &Rig, positions: &[[f64; 3]]) -> Posed {
+pub fn t_pose(rig: &BaseRig, positions: &[[f64; 3]]) -> TPosed {
     let joints = rig.joints(positions);
     let world = world_rotations(&joints);
     let mut places = vec![[0.0; 3]; joints.len()];
     let mut bones = Vec::with_capacity(joints.len());
     for (j, joint) in joints.iter().enumerate() {
         if let Some(p) = rig.parents[j] {
-            let turned = apply(&world[p], difference(*joint, joints[p]));
-            places[j] = std::array::from_fn(|a| places[p][a] + turned[a]);
+            places[j] = add(places[p], apply(&world[p], sub(*joint, joints[p])));
         }
-        let moved = apply(&world[j], *joint);
-        let bone: [[f64; 4]; 3] = std::array::from_fn(|a| {
-            let r = world[j][a];
-            [r[0], r[1], r[2], places[j][a] - moved[a]]
-        });
-        bones.push(bone);
+        bones.push(rigid_motion(&world[j], *joint, places[j]));
     }
     let positions = positions
         .par_iter()
         .with_min_len(2048)
         .enumerate()
-        .map(|(v, p)| {
-            let (row_joints, weights) = rig.skin_weights.row(v);
-            skin(*p, row_joints.iter().zip(weights).map(|(j, w)| (&bones[usize::from(*j)], f64::from(*w))))
-        })
+        .map(|(v, p)| skin(*p, rig.skin_weights.of_vertex(v).map(|(j, w)| (&bones[j], f64::from(w)))))
         .collect();
-    let joints = joints.iter().zip(&bones).map(|(p, b)| transform(b, *p)).collect();
-    Posed { positions, joints }
+    let joints = joints.iter().zip(&bones).map(|(p, b)| transform::apply(b, *p)).collect();
+    TPosed { positions, joints }
 }
 
 /// World rotation of each joint that takes the person's rest pose to the T-pose.
 fn world_rotations(joints: &[[f64; 3]]) -> Vec<Matrix3> {
     let mut world = vec![IDENTITY; joints.len()];
-    let bone = |from: usize, to: usize| difference(joints[to], joints[from]);
-    for side in &SIDES {
-        let s = side.sign;
+    let bone = |from: usize, to: usize| sub(joints[to], joints[from]);
+    for (side, s) in [(0, 1.0), (1, -1.0)] {
+        // Of SMPL-X: the joints of the right side come after those of the left one, its fingers 15 later.
+        let [hip, knee, ankle, foot] = [1, 4, 7, 10].map(|left| left + side);
+        let [collar, shoulder, elbow, wrist] = [13, 16, 18, 20].map(|left| left + side);
+        let hand = 25 + 15 * side;
         let along = [s, 0.0, 0.0];
         // Fingers follow index, middle, pinky, ring, thumb with three joints each.
-        let (index, middle, pinky) = (side.hand, side.hand + 3, side.hand + 6);
-        let collar = matrix_from_axis_angle([0.0, 0.0, s * CLAVICLE_LIFT]);
+        let (index, middle, pinky) = (hand, hand + 3, hand + 6);
+        world[collar] = matrix_from_axis_angle([0.0, 0.0, s * CLAVICLE_LIFT]);
         let aligned = |parent: &Matrix3, direction: [f64; 3], to: [f64; 3]| {
             product(&between(apply(parent, direction), to), parent)
         };
-        let shoulder = aligned(&collar, bone(side.shoulder, side.elbow), along);
-        let elbow = aligned(&shoulder, bone(side.elbow, side.wrist), along);
-        let wrist = aligned(&elbow, bone(side.wrist, middle), along);
+        let upper_arm = aligned(&world[collar], bone(shoulder, elbow), along);
+        let forearm = aligned(&upper_arm, bone(elbow, wrist), along);
+        let palm = aligned(&forearm, bone(wrist, middle), along);
         // A small roll about the arm levels the knuckles (index → pinky points backwards), spread over the arm. Its sense is
         // that of the published preparation script, so that both give the same body; at about 1° it hardly shows.
-        let knuckles = apply(&wrist, bone(index, pinky));
+        let knuckles = apply(&palm, bone(index, pinky));
         let turn = std::f64::consts::TAU;
         let roll = 0.5 * turn - knuckles[1].atan2(knuckles[2]);
         let roll = (roll + 0.5 * turn).rem_euclid(turn) - 0.5 * turn;
         let rolled = |share: f64, m: &Matrix3| product(&matrix_from_axis_angle([share * roll, 0.0, 0.0]), m);
-        world[side.collar] = collar;
-        world[side.shoulder] = rolled(0.3, &shoulder);
-        world[side.elbow] = rolled(0.65, &elbow);
-        world[side.wrist] = rolled(1.0, &wrist);
-        for j in side.hand..side.hand + 15 {
-            world[j] = world[side.wrist];
-        }
-        let hip = between(bone(side.hip, side.knee), [s * 0.035, -1.0, 0.0]);
-        world[side.hip] = hip;
-        world[side.knee] = aligned(&hip, bone(side.knee, side.ankle), [s * 0.035, -1.0, -0.03]);
-        let toes = bone(side.ankle, side.foot);
+        world[shoulder] = rolled(0.3, &upper_arm);
+        world[elbow] = rolled(0.65, &forearm);
+        world[wrist] = rolled(1.0, &palm);
+        let whole_hand = world[wrist];
+        world[hand..hand + 15].fill(whole_hand);
+        world[hip] = between(bone(hip, knee), [s * 0.035, -1.0, 0.0]);
+        world[knee] = aligned(&world[hip], bone(knee, ankle), [s * 0.035, -1.0, -0.03]);
+        let toes = bone(ankle, foot);
         let length = toes[0].hypot(toes[2]);
-        world[side.ankle] = between(toes, [s * 0.12 * length, toes[1], length]);
-        world[side.foot] = world[side.ankle];
+        world[ankle] = between(toes, [s * 0.12 * length, toes[1], length]);
+        world[foot] = world[ankle];
     }
     world
-}
-
-fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }

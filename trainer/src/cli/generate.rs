@@ -7,11 +7,9 @@ use crate::dataset::load_body;
 use crate::picture::save_png;
 use clap::Parser;
 use clothcombo_data::asset::{Body, Category, Garment};
-use clothcombo_data::folders::{
-    FolderGarment, ManifestEntry, read_manifest, refuse_unlisted, save_garment, save_manifest,
-};
+use clothcombo_data::folders::{ManifestEntry, read_manifest, refuse_unlisted, save_garment, save_manifest};
 use clothcombo_data::format::obj;
-use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
+use clothcombo_data::generate::GarmentGenerator;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -125,16 +123,15 @@ struct WantedFile {
 struct GarmentMaker<'a> {
     body: &'a Body,
     generator: GarmentGenerator<'a>,
-    settings: GarmentSettings,
+    vertices: usize,
     folder: &'a Path,
 }
 
 impl<'a> GarmentMaker<'a> {
     fn new(arguments: &'a Arguments, body: &'a Body) -> Result<Self, Report> {
-        let settings = GarmentSettings { target_vertices: arguments.vertices, ..GarmentSettings::default() };
-        settings.check().into_diagnostic()?;
+        GarmentGenerator::check_vertices(arguments.vertices).into_diagnostic()?;
         let generator = GarmentGenerator::new(body).into_diagnostic()?;
-        Ok(Self { body, generator, settings, folder: &arguments.output })
+        Ok(Self { body, generator, vertices: arguments.vertices, folder: &arguments.output })
     }
 
     /// Garment `i` of this run.
@@ -153,7 +150,7 @@ impl<'a> GarmentMaker<'a> {
     /// Refuses a folder in which another garment has the name of this one.
     fn check(&self, WantedFile { seed, path, .. }: &WantedFile) -> Result<(), Report> {
         match path.exists() {
-            true => check_source(path, &self.generator.provenance(*seed, &self.settings).source),
+            true => check_source(path, &self.generator.provenance(*seed, self.vertices).source),
             false => Ok(()),
         }
     }
@@ -161,17 +158,16 @@ impl<'a> GarmentMaker<'a> {
     /// Makes a garment unless it exists.
     fn make(&self, wanted: &WantedFile, listed: &HashSet<String>) -> Result<Made, Report> {
         let WantedFile { category, seed, path } = wanted;
-        let in_folder = |garment| FolderGarment { garment, layer: None, path: PathBuf::new() };
         if path.exists() {
             let is_listed = path.file_name().is_some_and(|name| listed.contains(&*name.to_string_lossy()));
             return Ok(Made::Kept(match is_listed {
                 true => None,
-                false => Some(Box::new(ManifestEntry::of(&in_folder(self.load(wanted)?)))),
+                false => Some(Box::new(ManifestEntry::of(&self.load(wanted)?))),
             }));
         }
-        match self.generator.generate(*category, *seed, &self.settings) {
+        match self.generator.generate(*category, *seed, self.vertices) {
             Ok(garment) => {
-                let entry = save_garment(self.folder, &in_folder(garment)).into_diagnostic()?;
+                let entry = save_garment(self.folder, &garment).into_diagnostic()?;
                 Ok(Made::New(Box::new(entry)))
             }
             Err(e) => Ok(Made::Failed(e.to_string())),
@@ -182,7 +178,7 @@ impl<'a> GarmentMaker<'a> {
     fn load(&self, WantedFile { category, seed, path }: &WantedFile) -> Result<Garment, Report> {
         let rest = obj::load(path).into_diagnostic()?;
         let name = GarmentGenerator::name(*category, *seed);
-        let source = self.generator.provenance(*seed, &self.settings);
+        let source = self.generator.provenance(*seed, self.vertices);
         let holding = Garment::needs_holding(&rest, self.body);
         Ok(Garment { name, holding, source, ..Garment::new(*category, rest) })
     }

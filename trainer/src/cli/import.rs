@@ -6,7 +6,7 @@ use crate::dataset::load_body;
 use clap::{Args, Subcommand, ValueEnum};
 use clothcombo_data::asset::{Body, BodyFileSettings, Provenance};
 use clothcombo_data::import::{
-    AmassSettings, AmcSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Thinning, UpAxis,
+    AmassSettings, AmcSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Thinning, WorldUp,
     import_amass, import_amc, import_bvh, import_cloth3d, import_deepmimic, import_smpl_family,
 };
 use miette::{IntoDiagnostic, Report};
@@ -177,12 +177,12 @@ pub enum Up {
 }
 
 impl Up {
-    fn axis(self) -> Option<UpAxis> {
+    fn axis(self) -> Option<WorldUp> {
         match self {
             Self::Auto => None,
-            Self::Y => Some(UpAxis::Y),
-            Self::Z => Some(UpAxis::Z),
-            Self::YDown => Some(UpAxis::YDown),
+            Self::Y => Some(WorldUp::Y),
+            Self::Z => Some(WorldUp::Z),
+            Self::YDown => Some(WorldUp::YDown),
         }
     }
 }
@@ -221,9 +221,6 @@ pub struct Cloth3dArguments {
     /// Body of male samples, the same model [default: the body itself]
     #[arg(long)]
     male: Option<String>,
-    /// Also convert the simulated vertices (.pc16) to npz
-    #[arg(long)]
-    caches: bool,
     #[command(flatten)]
     thinning: ThinningArguments,
     /// Folder to write
@@ -290,7 +287,6 @@ pub fn run(source: &ImportSource) -> Result<(), Report> {
             let bodies = Cloth3dBodies { target: &target, female: female.as_ref(), male: male.as_ref() };
             let settings = Cloth3dSettings {
                 thinning: a.thinning.thinning(),
-                caches: a.caches,
                 body_files: [Some(&a.body), a.female.as_ref(), a.male.as_ref()]
                     .into_iter()
                     .flatten()

@@ -4,7 +4,7 @@ use super::error::DatasetError;
 use crate::config::GarmentSourceConfig;
 use clothcombo_data::asset::{Body, Category, Garment};
 use clothcombo_data::folders::{ListedGarment, list_garment_folder};
-use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
+use clothcombo_data::generate::GarmentGenerator;
 
 /// A garment that can be read or made at any time, always the same.
 pub enum GarmentSource {
@@ -16,8 +16,8 @@ pub enum GarmentSource {
         category: Category,
         /// Its seed.
         seed: u64,
-        /// Size and detail.
-        settings: GarmentSettings,
+        /// About how many vertices it has.
+        vertices: usize,
     },
 }
 
@@ -35,12 +35,10 @@ impl GarmentSource {
                 own.extend(listed.into_iter().map(GarmentSource::File));
             }
             if let Some(generate) = &source.generate {
-                let settings =
-                    GarmentSettings { target_vertices: generate.vertices, ..GarmentSettings::default() };
                 own.extend((0..generate.count).map(|i| GarmentSource::Generated {
                     category: generate.categories[i % generate.categories.len()],
                     seed: generate.seed.wrapping_add(i as u64),
-                    settings: settings.clone(),
+                    vertices: generate.vertices,
                 }));
             }
             if !source.only.is_empty() {
@@ -67,7 +65,7 @@ impl GarmentSource {
     pub fn vertices(&self) -> Result<usize, DatasetError> {
         match self {
             Self::File(listed) => Ok(listed.vertex_count().map_err(DatasetError::data)?),
-            Self::Generated { settings, .. } => Ok(settings.target_vertices),
+            Self::Generated { vertices, .. } => Ok(*vertices),
         }
     }
 
@@ -103,10 +101,10 @@ impl<'a> GarmentLoader<'a> {
     /// [`DatasetError`] naming the file and line, or the design that failed.
     pub fn load(&self, origin: &GarmentSource) -> Result<Garment, DatasetError> {
         match origin {
-            GarmentSource::File(listed) => Ok(listed.load(self.body).map_err(DatasetError::data)?.garment),
-            GarmentSource::Generated { category, seed, settings } => {
+            GarmentSource::File(listed) => listed.load(self.body).map_err(DatasetError::data),
+            GarmentSource::Generated { category, seed, vertices } => {
                 let generator = self.generator.as_ref().expect("made for sources with generated garments");
-                generator.generate(*category, *seed, settings).map_err(DatasetError::data)
+                generator.generate(*category, *seed, *vertices).map_err(DatasetError::data)
             }
         }
     }

@@ -76,7 +76,7 @@ impl PoseLibrary {
         let filter = || SelfIntersectionFilter { body: body.clone(), contact: SelfContact::new(body), limit };
         let draw = PoseDraw {
             frames: config.motions.as_deref().map(split).transpose()?,
-            sampler: PoseSampler::default(),
+            sampler: PoseSampler,
             augmentation: config.augmentation.then(PoseAugmentation::default),
             filter: (limit < NO_FILTER).then(filter),
             remove_heading: config.remove_heading,

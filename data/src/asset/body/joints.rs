@@ -4,7 +4,7 @@ use super::Body;
 use crate::asset::skeleton::{BODY_JOINT_COUNT, family_ancestors, joint_index};
 
 /// Heights of a body in metres, from a small child to a giant.
-const HEIGHTS: std::ops::RangeInclusive<f64> = 0.4..=2.8;
+const BODY_HEIGHTS: std::ops::RangeInclusive<f64> = 0.4..=2.8;
 
 impl Body {
     /// The joint of this SMPL name; in a skeleton that names no joint so, the one that SMPL has at its place.
@@ -23,7 +23,7 @@ impl Body {
     pub fn implausibility(&self) -> Option<String> {
         let (low, high) = self.zero_body.bounds();
         let height = high[1] - low[1];
-        if !HEIGHTS.contains(&height) {
+        if !BODY_HEIGHTS.contains(&height) {
             return Some(format!("{height:.2} m high: are the units metres and y up?"));
         }
         if self.joint_count() < BODY_JOINT_COUNT {

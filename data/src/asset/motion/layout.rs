@@ -11,24 +11,28 @@
 //!
 //! Every array may be (N, 3J) or (N, J, 3) axis-angle, or (N, J, 3, 3) matrices.
 
-use super::{HINT, Pose};
+use crate::asset::pose::Pose;
 use crate::asset::rotation::{Matrix3, axis_angle_from_matrix};
 use crate::asset::skeleton::{BODY_JOINT_COUNT, BODY_JOINT_NAMES};
 use crate::format::{FileError, NpzFile};
 use std::path::{Path, PathBuf};
+
+const MOTION_HINT: &str =
+    "a motion has poses (frames, 66 or more) and mocap_framerate, or the keys of another SMPL tool";
 
 /// Keys of arrays that hold root and joints.
 const ALL_JOINTS: [&str; 4] = ["poses", "full_pose", "fullpose", "smpl_poses"];
 /// Keys of arrays that hold the joints without the root.
 const WITHOUT_ROOT: [&str; 2] = ["body_pose", "pose_body"];
 /// Keys of the root's rotation.
-const ROOT: [&str; 3] = ["global_orient", "root_orient", "Rh"];
+const ROOT_KEYS: [&str; 3] = ["global_orient", "root_orient", "Rh"];
 /// Numbers of joints without the root, of SMPL-X and of SMPL.
 const BODY_WITHOUT_ROOT: [usize; 2] = [21, 23];
 /// Numbers of joints, the root among them, of SMPL, SMPL-H and SMPL-X, with and without hands, jaw and eyes.
 const KNOWN_JOINTS: [usize; 8] = [22, 23, 24, 25, 52, 53, 54, 55];
 /// Keys of the frame rate (frames/s).
-const RATES: [&str; 6] = ["mocap_framerate", "mocap_frame_rate", "fps", "framerate", "frame_rate", "rate"];
+const RATE_KEYS: [&str; 6] =
+    ["mocap_framerate", "mocap_frame_rate", "fps", "framerate", "frame_rate", "rate"];
 /// Two rates whose ratio is this near to 1 are one rate: 29.97 is no 30, 120.00005 is 120.
 const SAME_RATE: f64 = 5e-4;
 
@@ -96,7 +100,7 @@ impl MotionFile {
             (Some((_, own)), Some(_)) => Ok(own),
             (None, None) => Err(format!(
                 "no frame rate: none of the keys {} is there; say it with `clothcombo import amass FILE --rate HZ -o FOLDER`",
-                RATES.join(", ")
+                RATE_KEYS.join(", ")
             )),
         }
     }
@@ -114,7 +118,7 @@ struct Rotations {
 }
 
 fn rotations(file: &mut NpzFile) -> Result<Rotations, FileError> {
-    let root = ROOT.into_iter().find(|key| file.contains(key));
+    let root = ROOT_KEYS.into_iter().find(|key| file.contains(key));
     let body = ALL_JOINTS.into_iter().chain(WITHOUT_ROOT).find(|key| file.contains(key));
     // Without any of them the message names the most common one.
     let body = body.unwrap_or(ALL_JOINTS[0]);
@@ -134,7 +138,7 @@ fn rotations(file: &mut NpzFile) -> Result<Rotations, FileError> {
         None if BODY_WITHOUT_ROOT.contains(&joints) && !ALL_JOINTS.contains(&body) => {
             Err(FileError::content(file.path())(format!(
                 "key '{body}' holds the joints without the root, and none of the keys {} of the root's rotation is there",
-                ROOT.join(", ")
+                ROOT_KEYS.join(", ")
             )))
         }
         _ => {
@@ -177,7 +181,7 @@ fn with_root(
 
 /// Joints per frame and all rotations (axis-angle, rad) of an array; (N, 3, 3) are matrices if it `is_root`.
 fn read_joints(file: &mut NpzFile, key: &str, is_root: bool) -> Result<(usize, Vec<[f64; 3]>), FileError> {
-    let array = file.numbers(key, HINT)?;
+    let array = file.numbers(key, MOTION_HINT)?;
     let vectors = || array.data.chunks_exact(3).map(|r| [r[0], r[1], r[2]]).collect();
     match array.shape[..] {
         [_, 3, 3] if is_root => Ok((1, axis_angles(file, key, 1, &array.data)?)),
@@ -220,8 +224,8 @@ fn is_rotation(m: &Matrix3) -> bool {
 /// The frame rate and its key; a scalar, or an array of equal numbers.
 fn rate(file: &mut NpzFile) -> Result<Option<(&'static str, f64)>, FileError> {
     let mut found: Option<(&'static str, f64)> = None;
-    for key in RATES.into_iter().filter(|key| file.contains(key)).collect::<Vec<_>>() {
-        let values = file.numbers(key, HINT)?.data;
+    for key in RATE_KEYS.into_iter().filter(|key| file.contains(key)).collect::<Vec<_>>() {
+        let values = file.numbers(key, MOTION_HINT)?.data;
         let Some(&value) = values.first() else {
             return Err(FileError::content(file.path())(format!("key '{key}' is an empty array")));
         };

@@ -112,8 +112,8 @@ fn shortest_turn(from: [f64; 3], to: [f64; 3]) -> Matrix3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::body::transform;
     use crate::generate::mannequin;
+    use clothcombo_physics::transform::apply as transform;
 
     #[test]
     fn joints_of_limbs_go_to_joints_and_a_body_to_itself() {

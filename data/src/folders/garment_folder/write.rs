@@ -1,6 +1,6 @@
 //! Writes a folder of garments.
 
-use super::{FolderGarment, MANIFEST, Manifest, ManifestEntry, read_manifest};
+use super::{MANIFEST, Manifest, ManifestEntry, read_manifest};
 use crate::asset::Garment;
 use crate::format::{FileError, is_mesh_path, obj, toml_file};
 use std::collections::HashSet;
@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn save_garment(folder: &Path, garment: &FolderGarment) -> Result<ManifestEntry, FileError> {
+pub fn save_garment(folder: &Path, garment: &Garment) -> Result<ManifestEntry, FileError> {
     let entry = ManifestEntry::of(garment);
-    let Garment { name, category, rest, .. } = &garment.garment;
+    let Garment { name, category, rest, .. } = garment;
     let comments = [
         format!("{name} ({category}), metres, y up, on the zero body in T-pose"),
         format!("source: {}", entry.source),
@@ -36,8 +36,8 @@ pub fn save_manifest(folder: &Path, entries: Vec<ManifestEntry>) -> Result<PathB
 }
 
 /// The files that [`save_garment_folder`] writes.
-pub fn garment_folder_files(folder: &Path, garments: &[FolderGarment]) -> Vec<PathBuf> {
-    let files = garments.iter().map(|g| format!("{}.obj", g.garment.name));
+pub fn garment_folder_files(folder: &Path, garments: &[Garment]) -> Vec<PathBuf> {
+    let files = garments.iter().map(|g| format!("{}.obj", g.name));
     files.chain([MANIFEST.into()]).map(|file| folder.join(file)).collect()
 }
 
@@ -64,7 +64,7 @@ pub fn refuse_unlisted(folder: &Path, files: &HashSet<PathBuf>) -> Result<(), Fi
 ///
 /// # Errors
 /// If the folder holds garments that it does not list, its manifest cannot be read, or a file cannot be written.
-pub fn save_garment_folder(folder: &Path, garments: &[FolderGarment]) -> Result<Vec<PathBuf>, FileError> {
+pub fn save_garment_folder(folder: &Path, garments: &[Garment]) -> Result<Vec<PathBuf>, FileError> {
     let files = garment_folder_files(folder, garments);
     refuse_unlisted(folder, &files.iter().cloned().collect())?;
     let mut entries = read_manifest(folder)?;

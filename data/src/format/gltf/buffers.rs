@@ -1,6 +1,6 @@
 //! The bytes behind glTF accessors: the binary chunk, `data:` URIs, files beside the document.
 
-use super::document::{Accessor, Document, SparsePart};
+use super::document::{Accessor, GltfDocument, SparsePart};
 use crate::format::polygon_mesh::{check_count, read_limited};
 use crate::format::scalar::Scalar;
 use base64::Engine;
@@ -41,33 +41,30 @@ fn largest(scalar: Scalar) -> f64 {
 pub(super) const DECOMPRESS: &str = "compressed meshes are not read; export without compression (Blender: glTF export, Data, \
                                      Compression off; or `gltf-transform copy IN OUT`)";
 
-/// Buffers of a document, loaded when first asked for.
+/// A document and its buffers, which are loaded when first asked for.
 pub(super) struct Buffers<'a> {
+    pub document: &'a GltfDocument,
     chunk: Option<&'a [u8]>,
     folder: PathBuf,
     loaded: Vec<Option<Cow<'a, [u8]>>>,
 }
 
 impl<'a> Buffers<'a> {
-    pub fn new(document: &Document, chunk: Option<&'a [u8]>, folder: &Path) -> Self {
+    pub fn new(document: &'a GltfDocument, chunk: Option<&'a [u8]>, folder: &Path) -> Self {
         let loaded = document.buffers.iter().map(|_| None).collect();
-        Self { chunk, folder: folder.into(), loaded }
+        Self { document, chunk, folder: folder.into(), loaded }
     }
 
     /// `N` numbers per item: floats; integers where the document is quantised, and as joints, weights and texture coordinates.
-    pub fn numbers<const N: usize>(
-        &mut self,
-        document: &Document,
-        accessor: usize,
-    ) -> Result<Vec<[f64; N]>, String> {
-        let item = get_accessor(document, accessor)?;
+    pub fn numbers<const N: usize>(&mut self, accessor: usize) -> Result<Vec<[f64; N]>, String> {
+        let item = self.accessor(accessor)?;
         let kind = match N {
             2 => "VEC2",
             3 => "VEC3",
             4 => "VEC4",
             _ => "MAT4",
         };
-        let is_quantised = document.extensions_used.iter().any(|name| name == QUANTISATION);
+        let is_quantised = self.document.extensions_used.iter().any(|name| name == QUANTISATION);
         // Texture coordinates may be normalised without an extension.
         let is_share =
             |scalar: &Scalar| N == 2 && item.normalized && matches!(scalar, Scalar::U8 | Scalar::U16);
@@ -86,7 +83,7 @@ impl<'a> Buffers<'a> {
         let mut numbers = Vec::new();
         match (&item.sparse, item.buffer_view) {
             (Some(_), None) => numbers.resize(item.count, [0.0; N]),
-            _ => self.for_each(document, accessor, item, N * size, |raw| numbers.push(parse(raw)))?,
+            _ => self.for_each(accessor, item, N * size, |raw| numbers.push(parse(raw)))?,
         }
         if let Some(sparse) = &item.sparse {
             let part = |part: &SparsePart, component_type: u32, kind: &str| Accessor {
@@ -103,10 +100,10 @@ impl<'a> Buffers<'a> {
                 return Err(format!("accessor {accessor} is sparse without indices or values"));
             };
             let indices = part(indices, indices.component_type.unwrap_or_default(), "SCALAR");
-            let indices = self.unsigned(document, accessor, &indices)?;
+            let indices = self.unsigned(accessor, &indices)?;
             let mut values = Vec::new();
             let of_values = part(values_there, item.component_type, kind);
-            self.for_each(document, accessor, &of_values, N * size, |raw| values.push(parse(raw)))?;
+            self.for_each(accessor, &of_values, N * size, |raw| values.push(parse(raw)))?;
             for (index, value) in indices.into_iter().zip(values) {
                 *numbers.get_mut(index as usize).ok_or_else(|| {
                     format!("accessor {accessor} changes item {index}, but has {}", item.count)
@@ -117,28 +114,28 @@ impl<'a> Buffers<'a> {
     }
 
     /// `count` finite texture coordinates; `None` for anything else.
-    pub fn texture(&mut self, document: &Document, accessor: usize, count: usize) -> Option<Vec<[f64; 2]>> {
-        let texture: Vec<[f64; 2]> = self.numbers(document, accessor).ok()?;
+    pub fn texture(&mut self, accessor: usize, count: usize) -> Option<Vec<[f64; 2]>> {
+        let texture: Vec<[f64; 2]> = self.numbers(accessor).ok()?;
         let is_finite = texture.as_flattened().iter().all(|x| x.is_finite());
         Some(texture).filter(|texture| texture.len() == count && is_finite)
     }
 
     /// A SCALAR of unsigned integers.
-    pub fn indices(&mut self, document: &Document, accessor: usize) -> Result<Vec<u32>, String> {
-        let item = get_accessor(document, accessor)?;
+    pub fn indices(&mut self, accessor: usize) -> Result<Vec<u32>, String> {
+        let item = self.accessor(accessor)?;
         if item.sparse.is_some() {
             return Err(format!("accessor {accessor} is sparse, which indices are not"));
         }
-        self.unsigned(document, accessor, item)
+        self.unsigned(accessor, item)
     }
 
-    fn unsigned(&mut self, document: &Document, number: usize, item: &Accessor) -> Result<Vec<u32>, String> {
+    fn unsigned(&mut self, number: usize, item: &Accessor) -> Result<Vec<u32>, String> {
         let scalar = scalar(item.component_type).filter(|_| item.kind == "SCALAR");
         let Some(scalar) = scalar.filter(|s| matches!(s, Scalar::U8 | Scalar::U16 | Scalar::U32)) else {
             return Err(format!("accessor {number} is no SCALAR of unsigned integers, as indices must be"));
         };
         let mut indices = Vec::new();
-        self.for_each(document, number, item, scalar.bytes(), |raw| {
+        self.for_each(number, item, scalar.bytes(), |raw| {
             indices.push(scalar.read(raw, false) as u32);
         })?;
         Ok(indices)
@@ -147,7 +144,6 @@ impl<'a> Buffers<'a> {
     /// Hands over every item of an accessor, `size` bytes each, after checking that all of them are there.
     fn for_each(
         &mut self,
-        document: &Document,
         number: usize,
         accessor: &Accessor,
         size: usize,
@@ -156,7 +152,7 @@ impl<'a> Buffers<'a> {
         let view_index = accessor
             .buffer_view
             .ok_or_else(|| format!("accessor {number} has no buffer view: {DECOMPRESS}"))?;
-        let view = (document.buffer_views.get(view_index))
+        let view = (self.document.buffer_views.get(view_index))
             .ok_or_else(|| format!("accessor {number} names buffer view {view_index}, which is not there"))?;
         let stride = view.byte_stride.unwrap_or(size);
         if stride < size || stride > 4096 {
@@ -171,7 +167,7 @@ impl<'a> Buffers<'a> {
             .checked_mul(stride)
             .and_then(|n| n.checked_add(size))
             .and_then(|n| n.checked_add(accessor.byte_offset));
-        let bytes = self.buffer(document, view.buffer)?;
+        let bytes = self.buffer(view.buffer)?;
         let view_bytes = view.byte_offset.checked_add(view.byte_length);
         let view_bytes = view_bytes.and_then(|end| bytes.get(view.byte_offset..end)).ok_or_else(|| {
             format!("buffer view {view_index} reaches past the {} bytes of its buffer", bytes.len())
@@ -193,8 +189,13 @@ impl<'a> Buffers<'a> {
         Ok(())
     }
 
-    fn buffer(&mut self, document: &Document, index: usize) -> Result<&[u8], String> {
-        let buffer = document.buffers.get(index).ok_or_else(|| format!("buffer {index} is not there"))?;
+    fn accessor(&self, index: usize) -> Result<&'a Accessor, String> {
+        self.document.accessors.get(index).ok_or_else(|| format!("accessor {index} is not there"))
+    }
+
+    fn buffer(&mut self, index: usize) -> Result<&[u8], String> {
+        let buffer =
+            self.document.buffers.get(index).ok_or_else(|| format!("buffer {index} is not there"))?;
         if self.loaded[index].is_none() {
             self.loaded[index] = Some(match &buffer.uri {
                 None => {
@@ -229,10 +230,6 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
-
-fn get_accessor(document: &Document, index: usize) -> Result<&Accessor, String> {
-    document.accessors.get(index).ok_or_else(|| format!("accessor {index} is not there"))
-}
 
 fn decode_data_uri(data: &str, index: usize) -> Result<Vec<u8>, String> {
     let encoded = data.split_once(";base64,").map(|(_, e)| e);

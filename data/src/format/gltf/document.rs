@@ -6,7 +6,7 @@ use std::collections::HashMap;
 /// What tells the version.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Header {
+pub(super) struct GltfHeader {
     pub asset: Asset,
 }
 
@@ -18,35 +18,35 @@ pub(super) struct Asset {
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(super) struct Document {
+pub(super) struct GltfDocument {
     pub extensions_required: Vec<String>,
     pub extensions_used: Vec<String>,
     pub scene: Option<usize>,
-    pub scenes: Vec<Scene>,
-    pub nodes: Vec<Node>,
-    pub meshes: Vec<Mesh>,
+    pub scenes: Vec<GltfScene>,
+    pub nodes: Vec<GltfNode>,
+    pub meshes: Vec<GltfMesh>,
     pub accessors: Vec<Accessor>,
     pub buffer_views: Vec<BufferView>,
     pub buffers: Vec<Buffer>,
-    pub skins: Vec<Skin>,
+    pub skins: Vec<GltfSkin>,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(super) struct Skin {
+pub(super) struct GltfSkin {
     pub joints: Vec<usize>,
     pub inverse_bind_matrices: Option<usize>,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Scene {
+pub(super) struct GltfScene {
     pub nodes: Vec<usize>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(default)]
-pub(super) struct Node {
+pub(super) struct GltfNode {
     pub name: String,
     pub children: Vec<usize>,
     pub mesh: Option<usize>,
@@ -60,7 +60,7 @@ pub(super) struct Node {
     pub scale: [f64; 3],
 }
 
-impl Default for Node {
+impl Default for GltfNode {
     fn default() -> Self {
         Self {
             name: String::new(),
@@ -78,7 +78,7 @@ impl Default for Node {
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Mesh {
+pub(super) struct GltfMesh {
     pub name: String,
     pub primitives: Vec<Primitive>,
     /// Of the morph targets.

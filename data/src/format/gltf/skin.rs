@@ -1,36 +1,29 @@
 //! Skins: vertices follow joint nodes.
 
+use super::affine::{from_columns, product};
 use super::buffers::Buffers;
-use super::document::{Document, Primitive};
-use super::{Affine, IDENTITY, product, transform};
+use super::document::Primitive;
+use clothcombo_physics::transform::{IDENTITY, Transform, apply};
 use std::collections::HashMap;
 
 /// Transforms of a skin's joints from where its vertices are bound to where the nodes are.
-pub(super) struct Joints(Vec<Affine>);
+pub(super) struct Joints(Vec<Transform>);
 
 impl Joints {
     /// `worlds`: of all nodes.
-    pub fn new(
-        document: &Document,
-        buffers: &mut Buffers,
-        skin: usize,
-        worlds: &[Affine],
-    ) -> Result<Self, String> {
-        let skin = document.skins.get(skin).ok_or_else(|| format!("skin {skin} is not there"))?;
-        let inverse: Vec<Affine> = match skin.inverse_bind_matrices {
+    pub fn new(buffers: &mut Buffers, skin: usize, worlds: &[Transform]) -> Result<Self, String> {
+        let skin = buffers.document.skins.get(skin).ok_or_else(|| format!("skin {skin} is not there"))?;
+        let inverse: Vec<Transform> = match skin.inverse_bind_matrices {
             None => vec![IDENTITY; skin.joints.len()],
             Some(accessor) => {
-                let columns: Vec<[f64; 16]> = buffers.numbers(document, accessor)?;
-                columns
-                    .iter()
-                    .map(|m| std::array::from_fn(|r| std::array::from_fn(|c| m[4 * c + r])))
-                    .collect()
+                let matrices: Vec<[f64; 16]> = buffers.numbers(accessor)?;
+                matrices.iter().map(from_columns).collect()
             }
         };
         if inverse.len() < skin.joints.len() {
             return Err(format!("a skin binds {} of {} joints", inverse.len(), skin.joints.len()));
         }
-        let of_joint = |(joint, inverse): (&usize, &Affine)| {
+        let of_joint = |(joint, inverse): (&usize, &Transform)| {
             let world =
                 worlds.get(*joint).ok_or_else(|| format!("node {joint} of {} is named", worlds.len()))?;
             Ok(product(world, inverse))
@@ -42,7 +35,6 @@ impl Joints {
     pub fn skin(
         &self,
         primitive: &Primitive,
-        document: &Document,
         buffers: &mut Buffers,
         positions: &mut [[f64; 3]],
     ) -> Result<(), String> {
@@ -52,8 +44,8 @@ impl Joints {
             let [joints, weights] =
                 ["JOINTS", "WEIGHTS"].map(|name| attributes.get(&format!("{name}_{set}")));
             let (Some(joints), Some(weights)) = (joints, weights) else { break };
-            let joints: Vec<[f64; 4]> = buffers.numbers(document, *joints)?;
-            let weights: Vec<[f64; 4]> = buffers.numbers(document, *weights)?;
+            let joints: Vec<[f64; 4]> = buffers.numbers(*joints)?;
+            let weights: Vec<[f64; 4]> = buffers.numbers(*weights)?;
             if joints.len() != positions.len() || weights.len() != positions.len() {
                 return Err(format!(
                     "joints and weights {set} are not one for each of {} vertices",
@@ -65,7 +57,7 @@ impl Joints {
                     let bone = self.0.get(*joint as usize);
                     let bone =
                         bone.ok_or_else(|| format!("vertex {v} follows joint {joint} of {}", self.0.len()))?;
-                    let moved = transform(bone, positions[v]);
+                    let moved = apply(bone, positions[v]);
                     let (sum, total) = &mut sums[v];
                     (0..3).for_each(|k| sum[k] += weight * moved[k]);
                     *total += weight;

@@ -112,15 +112,15 @@ impl File {
         self.accessors.len() - 1
     }
 
-    /// Vectors as `f32`; bounds are those of the rounded values, as readers check them.
-    fn vectors(&mut self, values: &[[f32; 3]], bounded: bool) -> usize {
-        let words = values.iter().flatten().map(|x| x.to_le_bytes());
-        let view = self.view(words, Some(VERTICES));
+    /// Numbers, `N` an item; bounds are those of the rounded values, as readers check them.
+    fn floats<const N: usize>(&mut self, values: &[[f32; N]], target: Option<u32>, bounded: bool) -> usize {
+        let view = self.view(values.iter().flatten().map(|x| x.to_le_bytes()), target);
+        let kind = ["SCALAR", "VEC2", "VEC3"][N - 1];
         let mut accessor =
-            json!({ "bufferView": view, "componentType": FLOAT, "count": values.len(), "type": "VEC3" });
+            json!({ "bufferView": view, "componentType": FLOAT, "count": values.len(), "type": kind });
         if bounded {
-            let bound = |pick: fn(f32, f32) -> f32| -> [f32; 3] {
-                std::array::from_fn(|a| values.iter().map(|v| v[a]).reduce(pick).unwrap_or(0.0))
+            let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
+                (0..N).map(|a| values.iter().map(|v| v[a]).reduce(pick).unwrap_or(0.0)).collect()
             };
             accessor["min"] = json!(bound(f32::min));
             accessor["max"] = json!(bound(f32::max));
@@ -128,33 +128,20 @@ impl File {
         self.accessor(accessor)
     }
 
-    fn scalars(&mut self, values: &[f32]) -> usize {
-        let view = self.view(values.iter().map(|x| x.to_le_bytes()), None);
-        let least = values.iter().copied().fold(f32::INFINITY, f32::min);
-        let largest = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        self.accessor(json!({
-            "bufferView": view, "componentType": FLOAT, "count": values.len(), "type": "SCALAR",
-            "min": [least], "max": [largest],
-        }))
+    fn vectors(&mut self, values: &[[f32; 3]], bounded: bool) -> usize {
+        self.floats(values, Some(VERTICES), bounded)
     }
 
     /// Times, and at each of them the weights of all targets: that of its own frame is 1.
     fn weights(&mut self, times: &[f64]) -> [usize; 2] {
         let targets = times.len() - 1;
         let first = times[0];
-        let seconds: Vec<f32> = times.iter().map(|t| (t - first) as f32).collect();
-        let mut weights = vec![0.0f32; times.len() * targets];
+        let seconds: Vec<[f32; 1]> = times.iter().map(|t| [(t - first) as f32]).collect();
+        let mut weights = vec![[0.0f32]; times.len() * targets];
         for frame in 1..times.len() {
-            weights[frame * targets + frame - 1] = 1.0;
+            weights[frame * targets + frame - 1] = [1.0];
         }
-        [self.scalars(&seconds), self.scalars(&weights)]
-    }
-
-    fn texture(&mut self, values: &[[f32; 2]]) -> usize {
-        let view = self.view(values.iter().flatten().map(|x| x.to_le_bytes()), Some(VERTICES));
-        self.accessor(
-            json!({ "bufferView": view, "componentType": FLOAT, "count": values.len(), "type": "VEC2" }),
-        )
+        [self.floats(&seconds, None, true), self.floats(&weights, None, true)]
     }
 
     fn add(&mut self, mesh: &SceneMesh, moves: bool) {
@@ -172,7 +159,7 @@ impl File {
         let normal = self.vectors(&base_normals, false);
         let mut attributes = json!({ "POSITION": position, "NORMAL": normal });
         if let Some(seams) = &seams {
-            attributes["TEXCOORD_0"] = json!(self.texture(&seams.texture));
+            attributes["TEXCOORD_0"] = json!(self.floats(&seams.texture, Some(VERTICES), false));
         }
         let faces = seams.as_ref().map_or(mesh.faces, |seams| &seams.faces);
         let indices = self.view(faces.iter().flatten().map(|v| v.to_le_bytes()), Some(INDICES));

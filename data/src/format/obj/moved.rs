@@ -3,8 +3,8 @@
 use super::super::atomic;
 use super::super::folder::has_extension;
 use super::super::polygon_mesh::read_limited;
-use super::statements::one_per_line;
-use std::io;
+use super::statements::rewritten;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 /// Statements of a material library that name a texture, but for those that begin with `map_`.
@@ -28,9 +28,42 @@ impl MovedObj {
     /// # Errors
     /// The number of vertices in the file, if there are not as many `positions`.
     pub fn new(path: &Path, bytes: &[u8], positions: &[[f64; 3]], name: &str) -> Result<Self, usize> {
-        let moved = without_normals(&with_positions(&one_per_line(bytes), positions)?);
-        let folder = path.parent().unwrap_or(Path::new(""));
-        Ok(with_materials(&moved, folder, name))
+        let mut count = 0;
+        let moved = rewritten(bytes, |statement, out| {
+            let mut words = statement.words();
+            match words.next() {
+                Some(b"v") => {
+                    if let Some([x, y, z]) = positions.get(count) {
+                        // Writing to memory cannot fail. The coordinates read back to the bit.
+                        let _ = write!(out, "v {x} {y} {z}");
+                    }
+                    count += 1;
+                    out.extend_from_slice(behind_coordinates(&statement.text));
+                    out.extend_from_slice(statement.new_end());
+                }
+                // Other positions make normals wrong; programs that read the file compute them anew.
+                Some(b"vn") => {}
+                Some(b"f") => {
+                    out.push(b'f');
+                    for word in words.take_while(|word| !word.starts_with(b"#")) {
+                        let mut parts = word.split(|b| *b == b'/');
+                        out.push(b' ');
+                        out.extend_from_slice(parts.next().unwrap_or_default());
+                        if let Some(texture) = parts.next().filter(|t| !t.is_empty()) {
+                            out.push(b'/');
+                            out.extend_from_slice(texture);
+                        }
+                    }
+                    out.push(b'\n');
+                }
+                _ => return false,
+            }
+            true
+        });
+        if count != positions.len() {
+            return Err(count);
+        }
+        Ok(with_materials(&moved, path.parent().unwrap_or(Path::new("")), name))
     }
 
     /// Writes both into `folder`, each whole or not at all.
@@ -45,26 +78,7 @@ impl MovedObj {
     }
 }
 
-/// Other vertex positions. What follows a vertex's coordinates (colours) stays, and the coordinates read back to the bit.
-fn with_positions(bytes: &[u8], positions: &[[f64; 3]]) -> Result<Vec<u8>, usize> {
-    let mut out = Vec::with_capacity(bytes.len() + bytes.len() / 4);
-    let mut count = 0;
-    for line in bytes.split_inclusive(|b| *b == b'\n') {
-        let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|word| !word.is_empty());
-        if words.next() != Some(b"v") {
-            out.extend_from_slice(line);
-            continue;
-        }
-        if let Some([x, y, z]) = positions.get(count) {
-            out.extend_from_slice(format!("v {x} {y} {z}").as_bytes());
-        }
-        count += 1;
-        out.extend_from_slice(behind_coordinates(line));
-    }
-    if count == positions.len() { Ok(out) } else { Err(count) }
-}
-
-/// What a vertex has behind its third coordinate, the line's end included.
+/// What a vertex has behind its third coordinate.
 pub(super) fn behind_coordinates(line: &[u8]) -> &[u8] {
     let mut rest = line;
     for _ in 0..4 {
@@ -73,32 +87,6 @@ pub(super) fn behind_coordinates(line: &[u8]) -> &[u8] {
         rest = &rest[start + length.unwrap_or(rest.len() - start)..];
     }
     rest
-}
-
-/// The bytes of an OBJ file without its normals, which other positions make wrong; programs that read it compute them anew.
-fn without_normals(bytes: &[u8]) -> Vec<u8> {
-    let mut out = Vec::with_capacity(bytes.len());
-    for line in bytes.split_inclusive(|b| *b == b'\n') {
-        let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|word| !word.is_empty());
-        match words.next() {
-            Some(b"vn") => {}
-            Some(b"f") => {
-                out.push(b'f');
-                for word in words.take_while(|word| !word.starts_with(b"#")) {
-                    let mut parts = word.split(|b| *b == b'/');
-                    out.push(b' ');
-                    out.extend_from_slice(parts.next().unwrap_or_default());
-                    if let Some(texture) = parts.next().filter(|t| !t.is_empty()) {
-                        out.push(b'/');
-                        out.extend_from_slice(texture);
-                    }
-                }
-                out.push(b'\n');
-            }
-            _ => out.extend_from_slice(line),
-        }
-    }
-    out
 }
 
 /// The OBJ file of `bytes`, from `folder`, with one material library instead of those it names. What cannot be read becomes a
@@ -184,12 +172,16 @@ mod tests {
     use super::*;
     use std::fs;
 
+    fn moved(text: &str, positions: &[[f64; 3]]) -> Result<String, usize> {
+        let moved = MovedObj::new(Path::new("shirt.obj"), text.as_bytes(), positions, "shirt")?;
+        Ok(String::from_utf8(moved.obj).unwrap())
+    }
+
     #[test]
     fn without_normals_everything_else_stays() {
         let text = "v 0 0 0\nvn 0 0 1\nvt 0 1\nusemtl red\nf 1/1/1 2//1 -1/2 4 # seam\r\n  f 1//1 2//1 3//1";
-        let bytes = without_normals(text.as_bytes());
         assert_eq!(
-            String::from_utf8(bytes).unwrap(),
+            moved(text, &[[0.0; 3]]).unwrap(),
             "v 0 0 0\nvt 0 1\nusemtl red\nf 1/1 2 -1/2 4\nf 1 2 3\n"
         );
     }
@@ -199,14 +191,13 @@ mod tests {
         let text =
             "# one\r\n  v 1 2 3 0.5 0.5 0.5 # red\r\nvn 0 0 1\nv 4 5 6#x\nv\t7 8 9\ng a b\nf 1/1 2/2 -1/3\n";
         let positions = [[0.1, -2e-17, 3.0], [1.0 / 3.0, 0.0, 0.0], [5.0, 6.0, 7.0]];
-        let bytes = with_positions(text.as_bytes(), &positions).unwrap();
-        let new = String::from_utf8(bytes).unwrap();
-        assert!(new.contains(" 0.5 0.5 0.5 # red\r\nvn 0 0 1\n") && new.contains("0 0#x\n"), "{new}");
+        let new = moved(text, &positions).unwrap();
+        assert!(new.contains(" 0.5 0.5 0.5 # red\r\n") && new.contains("0 0#x\n"), "{new}");
         assert!(new.ends_with("g a b\nf 1/1 2/2 -1/3\n"));
         let mesh = ObjMesh::parse(&new, Path::new("shirt.obj")).unwrap();
         assert_eq!(mesh.positions, positions);
         assert_eq!(mesh.polygons, [[0, 1, 2]]);
-        assert_eq!(with_positions(text.as_bytes(), &positions[1..]), Err(3));
+        assert_eq!(moved(text, &positions[1..]), Err(3));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::super::file_face::FileFace;
 use super::moved::{MovedObj, behind_coordinates, with_materials};
-use super::statements::{Statement, statements};
+use super::statements::{rewritten, statements};
 use super::texture::texture_of;
 use std::io::Write as _;
 use std::path::Path;
@@ -27,16 +27,15 @@ impl MovedObj {
     /// # Errors
     /// Numbers of vertices and faces in the file, if it has fewer than `form` speaks of.
     pub fn repaired(path: &Path, bytes: &[u8], form: &RepairedForm, name: &str) -> Result<Self, [usize; 2]> {
-        let mut out = Vec::with_capacity(bytes.len() + bytes.len() / 4);
         let (mut vertices, mut faces, mut texture) = (0u32, 0u32, 0i64);
         let (mut next_vertex, mut next_face) = (0, 0);
-        let keeps_numbers = form.vertex_origin.iter().copied().eq(0..count_vertices(bytes));
-        for Statement { text, end, .. } in statements(bytes) {
-            let mut words = text.split(|b| b.is_ascii_whitespace()).filter(|word| !word.is_empty());
-            let mut stays = false;
+        let vertex_count = statements(bytes).filter(|s| s.words().next() == Some(b"v")).count() as u32;
+        let keeps_numbers = form.vertex_origin.iter().copied().eq(0..vertex_count);
+        let out = rewritten(bytes, |statement, out| {
+            let mut words = statement.words();
             match words.next() {
                 Some(b"v") => {
-                    let rest = behind_coordinates(&text);
+                    let rest = behind_coordinates(&statement.text);
                     while form.vertex_origin.get(next_vertex) == Some(&vertices) {
                         let [x, y, z] = form.positions[next_vertex];
                         // Writing to memory cannot fail.
@@ -68,27 +67,17 @@ impl MovedObj {
                 Some(b"l" | b"p") if !keeps_numbers => {}
                 Some(b"vt") => {
                     texture += 1;
-                    stays = true;
+                    return false;
                 }
-                _ => stays = true,
+                _ => return false,
             }
-            if stays {
-                out.extend_from_slice(&text);
-                out.extend_from_slice(if end == b"\r" { b"\n" } else { end });
-            }
-        }
+            true
+        });
         if next_vertex < form.positions.len() || next_face < form.faces.len() {
             return Err([vertices as usize, faces as usize]);
         }
         Ok(with_materials(&out, path.parent().unwrap_or(Path::new("")), name))
     }
-}
-
-fn count_vertices(bytes: &[u8]) -> u32 {
-    let is_vertex = |text: &[u8]| {
-        text.split(|b| b.is_ascii_whitespace()).find(|word| !word.is_empty()) == Some(b"v".as_slice())
-    };
-    statements(bytes).filter(|s| is_vertex(&s.text)).count() as u32
 }
 
 #[cfg(test)]

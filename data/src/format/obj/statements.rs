@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::iter;
 
 /// Left by some editors; taken for a part of the first word it would hide the first vertex.
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// One statement.
 #[derive(Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub(super) struct Statement<'a> {
 
 /// The statements of a file, empty lines and comments included.
 pub(super) fn statements(bytes: &[u8]) -> impl Iterator<Item = Statement<'_>> {
-    let mut rest = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+    let mut rest = bytes.strip_prefix(UTF8_MARK).unwrap_or(bytes);
     let mut lines = 0;
     iter::from_fn(move || {
         let first = lines + 1;
@@ -53,13 +53,27 @@ fn first_line(bytes: &[u8]) -> (&[u8], &[u8], &[u8]) {
     (line, end, after)
 }
 
-/// The file with every statement on a line of its own and no mark of the byte order: what can be changed line by line.
-/// A file that is so already stays as it is, to the byte.
-pub(super) fn one_per_line(bytes: &[u8]) -> Vec<u8> {
-    let mut out = Vec::with_capacity(bytes.len());
-    for Statement { text, end, .. } in statements(bytes) {
-        out.extend_from_slice(&text);
-        out.extend_from_slice(if end == b"\r" { b"\n" } else { end });
+impl Statement<'_> {
+    /// Its words, the keyword first.
+    pub fn words(&self) -> impl Iterator<Item = &[u8]> {
+        self.text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+    }
+
+    /// How its line ends in a new file.
+    pub fn new_end(&self) -> &[u8] {
+        if self.end == b"\r" { b"\n" } else { self.end }
+    }
+}
+
+/// The file with every statement on a line of its own and no mark of the byte order. What `replaced` writes takes the place of a
+/// statement for which it says so; the others stay as they are, to the byte.
+pub(super) fn rewritten(bytes: &[u8], mut replaced: impl FnMut(&Statement, &mut Vec<u8>) -> bool) -> Vec<u8> {
+    let mut out = Vec::with_capacity(bytes.len() + bytes.len() / 4);
+    for statement in statements(bytes) {
+        if !replaced(&statement, &mut out) {
+            out.extend_from_slice(&statement.text);
+            out.extend_from_slice(statement.new_end());
+        }
     }
     out
 }
@@ -106,6 +120,7 @@ mod tests {
     #[test]
     fn only_what_needs_it_changes() {
         let plain = b"# caf\xe9 \\ x\r\n\nv 1 2 3\r\nmtllib a\\b.mtl\nf 1 1 1";
+        let one_per_line = |bytes: &[u8]| rewritten(bytes, |_, _| false);
         assert_eq!(one_per_line(plain), plain);
         assert_eq!(one_per_line(b"\xef\xbb\xbfv 1 \\\r\n2 3\rf 1\\\n 1 1\r"), b"v 1  2 3\nf 1  1 1\n");
         assert_eq!(one_per_line(b""), b"");

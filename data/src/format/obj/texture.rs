@@ -44,7 +44,7 @@ fn textured_faces(bytes: &[u8], vertices: &[u32]) -> Option<Vec<Face>> {
     let (mut vertex_count, mut texture) = (0_i64, Vec::new());
     let mut faces: Vec<Vec<(i64, i64)>> = Vec::new();
     for statement in statements(bytes) {
-        let mut words = statement.text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let mut words = statement.words();
         match words.next() {
             Some(b"v") => vertex_count += 1,
             Some(b"vt") => {

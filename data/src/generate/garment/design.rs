@@ -6,11 +6,9 @@
 //! pleats finer than the triangles), cutting uses the nearest possible one.
 
 use crate::asset::Category;
-use serde::{Deserialize, Serialize};
 
 /// The design of one garment, without its mesh.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone)]
 pub enum GarmentDesign {
     /// A skirt.
     Skirt(SkirtDesign),
@@ -32,7 +30,7 @@ impl GarmentDesign {
 }
 
 /// A tube from the waist down.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone)]
 pub struct SkirtDesign {
     /// Height of the rim: 0 low on the hips, 1 at the waist.
     pub rise: f64,
@@ -51,7 +49,7 @@ pub struct SkirtDesign {
 }
 
 /// Two legs and a seat.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone)]
 pub struct TrousersDesign {
     /// Height of the rim: 0 low on the hips, 1 at the waist.
     pub rise: f64,
@@ -74,7 +72,7 @@ pub struct TrousersDesign {
 }
 
 /// A garment hung from the shoulders or the chest.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone)]
 pub struct UpperDesign {
     /// Dress, top, T-shirt or open shirt.
     pub category: Category,
@@ -97,7 +95,7 @@ pub struct UpperDesign {
 }
 
 /// How the outline of a skirt leaves the body.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone)]
 pub struct FlareDesign {
     /// Extra radius per metre of height (m/m), 0–0.55.
     pub flare: f64,
@@ -106,7 +104,7 @@ pub struct FlareDesign {
 }
 
 /// Regular folds around a skirt.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone)]
 pub struct PleatDesign {
     /// Number around the skirt, 6–28; fewer where a pleat would be narrower than six edges.
     pub count: u32,
@@ -119,8 +117,7 @@ pub struct PleatDesign {
 }
 
 /// The upper edge of an upper garment.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone)]
 pub enum Neckline {
     /// A level edge below the armpits.
     Strapless {
@@ -148,7 +145,7 @@ pub enum Neckline {
 }
 
 /// A pair of sleeves.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone)]
 pub struct SleeveDesign {
     /// End of the sleeve: 0 at the shoulder, 1 at the wrist; 0.2–0.97.
     pub length: f64,
@@ -167,8 +164,7 @@ pub struct SleeveDesign {
 }
 
 /// How the front of an upper garment opens.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone)]
 pub enum Front {
     /// Closed.
     Closed,

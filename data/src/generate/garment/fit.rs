@@ -1,7 +1,7 @@
 //! A body measured for the generator, and the distance to its surface.
 
+use super::error::GarmentError;
 use super::measures::BodyMeasures;
-use super::settings::GarmentError;
 use crate::asset::Body;
 use crate::mesh::DistanceGrid;
 use clothcombo_physics::query::Surface;

@@ -1,6 +1,6 @@
 //! What is measured on a body: tubes around trunk, legs and arms, and landmarks.
 
-use super::settings::GarmentError;
+use super::error::GarmentError;
 use super::tube::Tube;
 use crate::asset::{BODY_JOINT_COUNT, Body};
 use crate::generate::parts::dominant_joints;
@@ -39,24 +39,25 @@ pub(crate) struct BodyMeasures {
 }
 
 /// No vertex of a body is farther from the pelvis (m).
-const FARTHEST: f64 = 5.0;
+const FARTHEST_VERTEX: f64 = 5.0;
 
 impl BodyMeasures {
     /// Measures the zero body.
     ///
     /// # Errors
-    /// [`GarmentError::UnsuitableBody`] if it has no T-pose with the SMPL body joints.
+    /// [`GarmentError`] if it has no T-pose with the SMPL body joints.
     pub fn new(body: &Body) -> Result<Self, GarmentError> {
-        let unsuitable = |reason: String| GarmentError::UnsuitableBody { body: body.name.clone(), reason };
+        let unsuitable =
+            |reason: String| GarmentError(format!("cannot cut garments for body '{}': {reason}", body.name));
         if body.joint_count() < BODY_JOINT_COUNT {
             return Err(unsuitable(format!(
                 "it has {} joints; garments are cut by the {BODY_JOINT_COUNT} SMPL body joints",
                 body.joint_count()
             )));
         }
-        if let Some(vertex) = body.template.iter().position(|p| p.iter().any(|x| x.abs() > FARTHEST)) {
+        if let Some(vertex) = body.template.iter().position(|p| p.iter().any(|x| x.abs() > FARTHEST_VERTEX)) {
             return Err(unsuitable(format!(
-                "vertex {vertex} is more than {FARTHEST} m from its pelvis; is it in metres?"
+                "vertex {vertex} is more than {FARTHEST_VERTEX} m from its pelvis; is it in metres?"
             )));
         }
         if let Some(reason) = body.implausibility() {

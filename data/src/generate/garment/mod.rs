@@ -9,13 +9,13 @@
 mod cloth;
 mod cut;
 mod design;
+mod error;
 mod fit;
 mod lower;
 pub(crate) mod measures;
 mod pattern;
 mod quality;
 mod random_design;
-mod settings;
 mod tube;
 mod upper;
 
@@ -26,17 +26,23 @@ use cloth::ClothSurface;
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::contact::TriangleTree;
 use cut::cut_pattern;
+use design::GarmentDesign;
 use fit::BodyFit;
 use quality::GarmentQuality;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-pub use design::{
-    FlareDesign, Front, GarmentDesign, Neckline, PleatDesign, SkirtDesign, SleeveDesign, TrousersDesign,
-    UpperDesign,
-};
-pub use settings::{GarmentError, GarmentSettings};
+pub use error::GarmentError;
 pub(crate) use tube::Tube;
+
+/// Relative spread of the number of vertices over seeds.
+const RESOLUTION_SPREAD: f64 = 0.25;
+/// Relative variation of the edge length within a garment: the triangulation is irregular, so that a network cannot learn it.
+const SIZING_VARIATION: f64 = 0.15;
+/// Least distance between cloth and skin at rest (m).
+const LEAST_CLEARANCE: f64 = 0.005;
+/// Designs tried before giving up on a seed.
+const DESIGNS_TRIED: u64 = 12;
 
 /// Generates garments for one body; measures the body once.
 #[derive(Debug)]
@@ -52,7 +58,7 @@ impl<'a> GarmentGenerator<'a> {
     /// Measures the zero body.
     ///
     /// # Errors
-    /// [`GarmentError::UnsuitableBody`] if it has no T-pose with the SMPL body joints.
+    /// [`GarmentError`] if it has no T-pose with the SMPL body joints.
     pub fn new(body: &'a Body) -> Result<Self, GarmentError> {
         let fit = BodyFit::new(body)?;
         let mut hasher = blake3::Hasher::new();
@@ -63,53 +69,43 @@ impl<'a> GarmentGenerator<'a> {
         Ok(Self { body, body_hash, fit, tree: TriangleTree::new(&body.template, &body.faces) })
     }
 
-    /// One garment of random design at rest on the zero body: an orientable manifold with boundary, one component, faces
+    /// Whether a garment can have about so many `vertices`.
+    ///
+    /// # Errors
+    /// [`GarmentError`] if not.
+    pub fn check_vertices(vertices: usize) -> Result<(), GarmentError> {
+        match (200..=50_000).contains(&vertices) {
+            true => Ok(()),
+            false => {
+                Err(GarmentError(format!("garment generator: {vertices} vertices, expected 200 to 50000")))
+            }
+        }
+    }
+
+    /// One garment of random design and about so many `vertices` at rest on the zero body: an orientable manifold with boundary, one component, faces
     /// outward, wholly outside the body (exact test) and free of self-intersections, edges within 0.4–2.5 of their
     /// median, angles of at least 15°. A design that misses one of these is replaced by another one of the same seed.
     ///
     /// # Errors
-    /// [`GarmentError::Setting`] and [`GarmentError::Exhausted`].
-    pub fn generate(
-        &self,
-        category: Category,
-        seed: u64,
-        settings: &GarmentSettings,
-    ) -> Result<Garment, GarmentError> {
-        let random = |attempt| GarmentDesign::random(category, &mut stream(seed, category, attempt, 0));
-        self.first_that_passes(category, seed, settings, &random)
-    }
-
-    /// A garment of the given design, with the guarantees of [`Self::generate`]. The seed decides about the mesh; other
-    /// triangulations are tried where one misses a guarantee.
-    ///
-    /// # Errors
-    /// [`GarmentError::Setting`], and [`GarmentError::Exhausted`] for a design that does not work on this body.
-    pub fn make(
-        &self,
-        design: &GarmentDesign,
-        seed: u64,
-        settings: &GarmentSettings,
-    ) -> Result<Garment, GarmentError> {
-        self.first_that_passes(design.category(), seed, settings, &|_| design.clone())
-    }
-
-    /// The garment of the first attempt that passes all checks.
-    fn first_that_passes(
-        &self,
-        category: Category,
-        seed: u64,
-        settings: &GarmentSettings,
-        design: &dyn Fn(u64) -> GarmentDesign,
-    ) -> Result<Garment, GarmentError> {
-        settings.check()?;
+    /// [`GarmentError`] for another number of vertices, and for a seed without a design that passes.
+    pub fn generate(&self, category: Category, seed: u64, vertices: usize) -> Result<Garment, GarmentError> {
+        Self::check_vertices(vertices)?;
         let mut last = String::new();
-        for attempt in 0..settings.attempts as u64 {
-            match self.attempt(&design(attempt), seed, attempt, settings) {
-                Ok(rest) => return Ok(self.garment(category, seed, settings, rest)),
+        for attempt in 0..DESIGNS_TRIED {
+            let design = GarmentDesign::random(category, &mut stream(seed, category, attempt, 0));
+            match self.attempt(&design, seed, attempt, vertices) {
+                Ok(rest) => {
+                    let (name, source) = (Self::name(category, seed), self.provenance(seed, vertices));
+                    let holding = Garment::needs_holding(&rest, self.body);
+                    return Ok(Garment { name, holding, source, ..Garment::new(category, rest) });
+                }
                 Err(reason) => last = reason,
             }
         }
-        Err(GarmentError::Exhausted { category, seed, attempts: settings.attempts, last })
+        Err(GarmentError(format!(
+            "no {category} for seed {seed} passed the checks in {DESIGNS_TRIED} designs; the last one {last}; hint: use another \
+             seed, or more vertices if the garment has narrow parts"
+        )))
     }
 
     /// The name of the garment of a seed.
@@ -117,20 +113,14 @@ impl<'a> GarmentGenerator<'a> {
         format!("{category}_{seed:06}")
     }
 
-    /// Where the garment of a seed comes from: says which body, seed and settings make the same garment again.
-    pub fn provenance(&self, seed: u64, settings: &GarmentSettings) -> Provenance {
-        let (name, hash, vertices) = (&self.body.name, &self.body_hash, settings.target_vertices);
+    /// Where the garment of a seed comes from: says which body, seed and number of vertices make the same garment again.
+    pub fn provenance(&self, seed: u64, vertices: usize) -> Provenance {
+        let (name, hash) = (&self.body.name, &self.body_hash);
         Provenance {
             source: format!("{GENERATED}{name} ({hash}) from seed {seed}, about {vertices} vertices"),
             author: "ClothCombo-rs".to_string(),
             licence: "CC0-1.0".to_string(),
         }
-    }
-
-    fn garment(&self, category: Category, seed: u64, settings: &GarmentSettings, rest: TriMesh) -> Garment {
-        let (name, source) = (Self::name(category, seed), self.provenance(seed, settings));
-        let holding = Garment::needs_holding(&rest, self.body);
-        Garment { name, holding, source, ..Garment::new(category, rest) }
     }
 
     /// One mesh of a design; the error says which check it failed.
@@ -139,12 +129,11 @@ impl<'a> GarmentGenerator<'a> {
         design: &GarmentDesign,
         seed: u64,
         attempt: u64,
-        settings: &GarmentSettings,
+        vertices: usize,
     ) -> Result<TriMesh, String> {
         let category = design.category();
         let mut rng = stream(seed, category, attempt, 1);
-        let spread = settings.resolution_spread;
-        let vertices = settings.target_vertices as f64 * (1.0 + spread * rng.random_range(-1.0..1.0));
+        let vertices = vertices as f64 * (1.0 + RESOLUTION_SPREAD * rng.random_range(-1.0..1.0));
         // A first guess of the edge length from a typical area; the real area is known after the cut.
         let area = match category {
             Category::Dress => 1.1,
@@ -153,7 +142,7 @@ impl<'a> GarmentGenerator<'a> {
             _ => 0.8,
         };
         let guess = edge_length(area, vertices);
-        let pattern = cut_pattern(&self.fit, design, guess, settings.clearance);
+        let pattern = cut_pattern(&self.fit, design, guess, LEAST_CLEARANCE);
 
         let step = (0.6 * guess).clamp(0.008, 0.018);
         let mut low = pattern.bounds[0];
@@ -178,7 +167,7 @@ impl<'a> GarmentGenerator<'a> {
         let target = ClothSurface {
             pattern: &pattern,
             edge_length: edge_length(triangles.area(), vertices),
-            variation: settings.sizing_variation,
+            variation: SIZING_VARIATION,
             waves: std::array::from_fn(|_| {
                 std::array::from_fn(|i| {
                     if i < 3 { rng.random_range(-3.5..3.5) } else { rng.random_range(0.0..1.0) }
@@ -215,8 +204,7 @@ fn edge_length(area: f64, vertices: f64) -> f64 {
 /// A garment of about `vertices` vertices for a test.
 #[cfg(test)]
 pub(crate) fn generated(body: &Body, category: Category, seed: u64, vertices: usize) -> Garment {
-    let settings = GarmentSettings { target_vertices: vertices, ..GarmentSettings::default() };
-    GarmentGenerator::new(body).unwrap().generate(category, seed, &settings).unwrap()
+    GarmentGenerator::new(body).unwrap().generate(category, seed, vertices).unwrap()
 }
 
 #[cfg(test)]

@@ -167,7 +167,7 @@ pub(super) fn gathered(radius: f64, limb: f64, cuff: f64, left: f64, sag: f64) -
 
 /// A box around the part of `tube` between two heights, with room for its folds.
 pub(super) fn column_bounds(tube: &Tube, low: f64, high: f64) -> [[f64; 3]; 2] {
-    const MARGIN: f64 = 0.04 + FOLD_HEIGHT;
+    const FOLD_MARGIN: f64 = 0.04 + FOLD_HEIGHT;
     let mut bounds = [[-0.1, low, -0.1], [0.1, high, 0.1]];
     for (k, radii) in tube.radii.iter().enumerate() {
         let y = tube.position(k);
@@ -178,8 +178,8 @@ pub(super) fn column_bounds(tube: &Tube, low: f64, high: f64) -> [[f64; 3]; 2] {
             let (sin, cos) = angle(i).sin_cos();
             let (x, z) = (tube.centres[k][1] + r * sin, tube.centres[k][0] + r * cos);
             for (axis, value) in [(0, x), (2, z)] {
-                bounds[0][axis] = bounds[0][axis].min(value - MARGIN);
-                bounds[1][axis] = bounds[1][axis].max(value + MARGIN);
+                bounds[0][axis] = bounds[0][axis].min(value - FOLD_MARGIN);
+                bounds[1][axis] = bounds[1][axis].max(value + FOLD_MARGIN);
             }
         }
     }

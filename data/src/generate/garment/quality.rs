@@ -8,10 +8,8 @@ use clothcombo_physics::{Topology, TriMesh};
 use std::collections::HashSet;
 
 /// Measurements of a garment at rest on the body it was made for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub(super) struct GarmentQuality {
-    /// Number of vertices.
-    pub vertices: usize,
     /// Connected components.
     pub components: usize,
     /// Closed boundary curves.
@@ -62,7 +60,6 @@ impl GarmentQuality {
         }
         let tree = TriangleTree::new(positions, rest.faces());
         Self {
-            vertices: positions.len(),
             components: topology.component_count,
             boundary_loops: topology.boundary_loops.len(),
             euler_characteristic: positions.len() as i64 - topology.edges.len() as i64

@@ -151,16 +151,13 @@ mod tests {
     use rand::SeedableRng;
 
     #[test]
-    fn random_designs_have_every_kind_and_survive_json() {
+    fn random_designs_have_every_kind() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let (mut pleats, mut plackets, mut cuffs, mut strapless) = (0, 0, 0, 0);
         for i in 0..600 {
             let category = Category::ALL[i % 6];
             let design = GarmentDesign::random(category, &mut rng);
             assert_eq!(design.category(), category);
-            let text = serde_json::to_string(&design).unwrap();
-            let again: GarmentDesign = serde_json::from_str(&text).unwrap();
-            assert_eq!(again.category(), category);
             let skirt = match &design {
                 GarmentDesign::Skirt(s) => &s.skirt,
                 GarmentDesign::Upper(u) => &u.skirt,

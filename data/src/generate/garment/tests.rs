@@ -1,3 +1,4 @@
+use super::design::{FlareDesign, Front, Neckline, PleatDesign, SkirtDesign, SleeveDesign, UpperDesign};
 use super::*;
 use crate::asset::BodyParts;
 use crate::generate::mannequin;
@@ -23,11 +24,11 @@ fn assert_guarantees(generator: &GarmentGenerator, garment: &Garment) {
 fn every_category_keeps_the_guarantees_with_a_topology_of_its_own() {
     let body = mannequin();
     let generator = GarmentGenerator::new(&body).unwrap();
-    let settings = GarmentSettings { target_vertices: 700, ..GarmentSettings::default() };
+    const VERTICES: usize = 700;
     let mut seen = HashSet::new();
     for category in Category::ALL {
         for seed in 0..3 {
-            let garment = generator.generate(category, seed, &settings).unwrap();
+            let garment = generator.generate(category, seed, VERTICES).unwrap();
             assert_guarantees(&generator, &garment);
             assert!(seen.insert(garment.rest.faces().to_vec()));
             let vertices = garment.rest.vertex_count();
@@ -40,11 +41,11 @@ fn every_category_keeps_the_guarantees_with_a_topology_of_its_own() {
 fn the_categories_cover_what_they_should() {
     let body = mannequin();
     let generator = GarmentGenerator::new(&body).unwrap();
-    let settings = GarmentSettings { target_vertices: 500, ..GarmentSettings::default() };
+    const VERTICES: usize = 500;
     let joint = &body.joint_template;
     for seed in 20..23 {
         for category in Category::ALL {
-            let garment = generator.generate(category, seed, &settings).unwrap();
+            let garment = generator.generate(category, seed, VERTICES).unwrap();
             let (low, high) = garment.rest.bounds();
             let at_chest = high[1] > joint[9][1];
             let below_hips = low[1] < joint[1][1];
@@ -76,9 +77,9 @@ fn the_categories_cover_what_they_should() {
 fn trouser_legs_are_apart_and_hems_are_exact_curves() {
     let body = mannequin();
     let generator = GarmentGenerator::new(&body).unwrap();
-    let settings = GarmentSettings { target_vertices: 500, ..GarmentSettings::default() };
+    const VERTICES: usize = 500;
     for seed in 0..3 {
-        let rest = generator.generate(Category::Trousers, seed, &settings).unwrap().rest;
+        let rest = generator.generate(Category::Trousers, seed, VERTICES).unwrap().rest;
         let topology = clothcombo_physics::Topology::new(&rest);
         assert_eq!(topology.boundary_loops.len(), 3);
         let lowest = rest.bounds().0[1];
@@ -126,12 +127,12 @@ fn smplx_shaped() -> Body {
 
 #[test]
 fn garments_of_every_category_keep_the_guarantees_on_two_bodies() {
-    let settings = GarmentSettings { target_vertices: 500, ..GarmentSettings::default() };
+    const VERTICES: usize = 500;
     for (body, count) in [(mannequin(), 48), (smplx_shaped(), 24)] {
         let generator = GarmentGenerator::new(&body).unwrap();
         (0..count).into_par_iter().with_max_len(1).for_each(|i| {
             let category = Category::ALL[i % Category::ALL.len()];
-            let garment = generator.generate(category, 300 + i as u64, &settings).unwrap();
+            let garment = generator.generate(category, 300 + i as u64, VERTICES).unwrap();
             assert_guarantees(&generator, &garment);
         });
     }
@@ -141,8 +142,8 @@ fn garments_of_every_category_keep_the_guarantees_on_two_bodies() {
 fn a_given_design_is_followed() {
     let body = mannequin();
     let generator = GarmentGenerator::new(&body).unwrap();
-    let settings = GarmentSettings { target_vertices: 900, ..GarmentSettings::default() };
-    let make = |design: &GarmentDesign| generator.make(design, 3, &settings).unwrap().rest;
+    const VERTICES: usize = 900;
+    let make = |design: &GarmentDesign| generator.attempt(design, 3, 0, VERTICES).unwrap();
     let mut skirt = SkirtDesign {
         rise: 0.5,
         length: 1.4,
@@ -238,9 +239,9 @@ fn the_same_seed_gives_the_same_garment_for_any_number_of_threads() {
 fn bad_settings_and_bodies_are_refused_with_a_reason() {
     let body = mannequin();
     let generator = GarmentGenerator::new(&body).unwrap();
-    let settings = GarmentSettings { target_vertices: 3, ..GarmentSettings::default() };
-    let message = generator.generate(Category::Top, 0, &settings).unwrap_err().to_string();
-    assert!(message.contains("target_vertices") && message.contains("200"), "{message}");
+    const VERTICES: usize = 3;
+    let message = generator.generate(Category::Top, 0, VERTICES).unwrap_err().to_string();
+    assert!(message.contains("3 vertices") && message.contains("200"), "{message}");
     // A body lying on its back.
     let mut lying = body.clone();
     let parts = &mut *lying;

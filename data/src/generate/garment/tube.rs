@@ -3,9 +3,9 @@
 use super::super::field::smooth_step;
 
 /// Directions per outline.
-pub(crate) const DIRECTIONS: usize = 32;
+const DIRECTIONS: usize = 32;
 /// Distance between slices (m).
-pub(crate) const SLICE: f64 = 0.015;
+const TUBE_SLICE: f64 = 0.015;
 
 /// Outlines along a coordinate axis. In slice coordinates a point is `(s, u, v)`: `s = side · p[axis]`, and `u`, `v` the
 /// other two axes in cyclic order.
@@ -32,7 +32,7 @@ impl Tube {
         range: [f64; 2],
         symmetric: bool,
     ) -> Option<Self> {
-        let count = ((range[1] - range[0]) / SLICE).floor();
+        let count = ((range[1] - range[0]) / TUBE_SLICE).floor();
         if !(3.0..=2000.0).contains(&count) {
             return None;
         }
@@ -43,7 +43,7 @@ impl Tube {
             let (s, u, v) = tube.coordinates(*p);
             // Each point serves every slice within reach, which bridges coarse bodies.
             let reach = 1.2;
-            let at = (s - range[0]) / SLICE;
+            let at = (s - range[0]) / TUBE_SLICE;
             let first = (at - reach).ceil().max(0.0) as usize;
             let last = (at + reach).floor();
             if last < 0.0 {
@@ -109,12 +109,12 @@ impl Tube {
 
     /// The coordinate `s` of a slice.
     pub fn position(&self, slice: usize) -> f64 {
-        self.start + SLICE * slice as f64
+        self.start + TUBE_SLICE * slice as f64
     }
 
     fn locate(&self, s: f64) -> (usize, f64) {
         let last = self.centres.len() - 1;
-        let at = ((s - self.start) / SLICE).clamp(0.0, last as f64);
+        let at = ((s - self.start) / TUBE_SLICE).clamp(0.0, last as f64);
         let k = (at as usize).min(last - 1);
         (k, at - k as f64)
     }

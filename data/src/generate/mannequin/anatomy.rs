@@ -7,7 +7,7 @@ use super::super::field::smooth_min;
 use clothcombo_physics::vec3::{add, dot, norm, scale, sub};
 
 /// Rest joints in SMPL order (m).
-pub(super) const JOINTS: [[f64; 3]; 22] = [
+pub(super) const REST_JOINTS: [[f64; 3]; 22] = [
     [0.0, 0.0, 0.0],
     [0.082, -0.085, -0.005],
     [-0.082, -0.085, -0.005],
@@ -196,7 +196,7 @@ pub(super) fn field(p: [f64; 3]) -> f64 {
 
 /// Where the bones end that have no further joint: (joint, tip).
 pub(super) fn tips() -> [(usize, [f64; 3]); 5] {
-    let beyond = |joint: usize, offset: [f64; 3]| (joint, add(JOINTS[joint], offset));
+    let beyond = |joint: usize, offset: [f64; 3]| (joint, add(REST_JOINTS[joint], offset));
     [
         beyond(15, [0.0, 0.170, 0.0]),
         beyond(20, [0.150, 0.0, 0.0]),

@@ -17,9 +17,9 @@ pub use shape::SHAPE_COMPONENT_NAMES;
 /// Edge length of the mannequin's triangles (m).
 const EDGE_LENGTH: f64 = 0.0183;
 
-struct Skin;
+struct MannequinSkin;
 
-impl RemeshTarget for Skin {
+impl RemeshTarget for MannequinSkin {
     fn project(&self, point: [f64; 3], _label: u32) -> [f64; 3] {
         field::project(anatomy::field, point, 2, 0.02)
     }
@@ -46,7 +46,7 @@ pub fn mannequin() -> Body {
         template: positions,
         shape_directions,
         shape_count: SHAPE_COMPONENT_NAMES.len(),
-        joint_template: anatomy::JOINTS.to_vec(),
+        joint_template: anatomy::REST_JOINTS.to_vec(),
         joint_shape_directions: shape::joint_directions(),
         pose_directions: None,
         skin_weights,
@@ -65,7 +65,7 @@ fn surface() -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let labels = vec![0; positions.len()];
     let mut sheet = EditableMesh::new(LabelledTriangles { positions, labels, faces });
     let quality = Quality { angle: 22.0, edge_ratio: [0.4, 2.5] };
-    remesh(&mut sheet, &Skin, 5, quality);
+    remesh(&mut sheet, &MannequinSkin, 5, quality);
     sheet.compact()
 }
 

@@ -10,7 +10,7 @@ use clothcombo_physics::mesh::vertex_normals;
 pub const SHAPE_COMPONENT_NAMES: [&str; 8] =
     ["height", "girth", "shoulder_width", "hip_width", "leg_length", "arm_length", "torso_length", "belly"];
 
-const COUNT: usize = SHAPE_COMPONENT_NAMES.len();
+const SHAPE_COUNT: usize = SHAPE_COMPONENT_NAMES.len();
 
 /// A ramp through zero that saturates at ±1 over `|x| ≥ width`.
 fn soft_sign(x: f64, width: f64) -> f64 {
@@ -19,7 +19,7 @@ fn soft_sign(x: f64, width: f64) -> f64 {
 }
 
 /// Displacement (m) of a point of space per unit of each component.
-fn space(p: [f64; 3]) -> [[f64; 3]; COUNT] {
+fn space(p: [f64; 3]) -> [[f64; 3]; SHAPE_COUNT] {
     let side = |width| soft_sign(p[0], width);
     let upper = smooth_step(0.16, 0.40, p[1]);
     let lower = smooth_step(0.16, -0.06, p[1]);
@@ -42,7 +42,7 @@ fn space(p: [f64; 3]) -> [[f64; 3]; COUNT] {
 }
 
 /// Displacement (m) along the normal per unit of each component, by the joint a vertex follows.
-fn thickness(p: [f64; 3], n: [f64; 3], joint: usize) -> [f64; COUNT] {
+fn thickness(p: [f64; 3], n: [f64; 3], joint: usize) -> [f64; SHAPE_COUNT] {
     let girth = match joint {
         0 | 3 | 6 => 0.0135,
         9 => 0.0115,
@@ -70,17 +70,16 @@ pub(super) fn vertex_directions(
     skin_weights: &SparseSkinWeights,
 ) -> Vec<f32> {
     let normals = vertex_normals(positions, faces);
-    let mut directions = Vec::with_capacity(positions.len() * 3 * COUNT);
+    let mut directions = Vec::with_capacity(positions.len() * 3 * SHAPE_COUNT);
     for (v, (p, n)) in positions.iter().zip(&normals).enumerate() {
-        let (joints, weights) = skin_weights.row(v);
-        let mut along = [0.0; COUNT];
-        for (j, w) in joints.iter().zip(weights) {
-            let part = thickness(*p, *n, usize::from(*j));
-            (0..COUNT).for_each(|k| along[k] += f64::from(*w) * part[k]);
+        let mut along = [0.0; SHAPE_COUNT];
+        for (j, w) in skin_weights.of_vertex(v) {
+            let part = thickness(*p, *n, j);
+            (0..SHAPE_COUNT).for_each(|k| along[k] += f64::from(w) * part[k]);
         }
         let moved = space(*p);
         for axis in 0..3 {
-            directions.extend((0..COUNT).map(|k| (moved[k][axis] + along[k] * n[axis]) as f32));
+            directions.extend((0..SHAPE_COUNT).map(|k| (moved[k][axis] + along[k] * n[axis]) as f32));
         }
     }
     directions
@@ -88,11 +87,11 @@ pub(super) fn vertex_directions(
 
 /// `[J × 3 × K]` row-major: the joints follow the displacement of space.
 pub(super) fn joint_directions() -> Vec<f64> {
-    let mut directions = Vec::with_capacity(anatomy::JOINTS.len() * 3 * COUNT);
-    for joint in anatomy::JOINTS {
+    let mut directions = Vec::with_capacity(anatomy::REST_JOINTS.len() * 3 * SHAPE_COUNT);
+    for joint in anatomy::REST_JOINTS {
         let moved = space(joint);
         for axis in 0..3 {
-            directions.extend((0..COUNT).map(|k| moved[k][axis]));
+            directions.extend((0..SHAPE_COUNT).map(|k| moved[k][axis]));
         }
     }
     directions

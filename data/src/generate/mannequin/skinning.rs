@@ -5,15 +5,15 @@ use crate::asset::{BODY_JOINT_COUNT, BODY_JOINT_PARENTS, SparseSkinWeights};
 use clothcombo_physics::vec3::{add, dot, norm, norm_squared, scale, sub};
 
 /// A bone of `joint` with the limb's usual radius, by which distances are measured.
-struct Bone {
+struct SkinBone {
     joint: usize,
     from: [f64; 3],
     to: [f64; 3],
     radius: f64,
 }
 
-fn bones() -> Vec<Bone> {
-    let joint = anatomy::JOINTS;
+fn bones() -> Vec<SkinBone> {
+    let joint = anatomy::REST_JOINTS;
     let mut bones = Vec::new();
     for child in 1..BODY_JOINT_COUNT {
         let Some(parent) = BODY_JOINT_PARENTS[child] else { continue };
@@ -39,11 +39,11 @@ fn bones() -> Vec<Bone> {
             13 | 14 => from = add(from, scale(sub(to, from), 0.2)),
             _ => {}
         }
-        bones.push(Bone { joint: parent, from, to, radius });
+        bones.push(SkinBone { joint: parent, from, to, radius });
     }
     for (tip_joint, tip) in anatomy::tips() {
         let radius = if tip_joint == 15 { 0.085 } else { 0.045 };
-        bones.push(Bone { joint: tip_joint, from: joint[tip_joint], to: tip, radius });
+        bones.push(SkinBone { joint: tip_joint, from: joint[tip_joint], to: tip, radius });
     }
     bones
 }

@@ -3,11 +3,11 @@
 use crate::asset::rotation::{axis_angle_from_quaternion, quaternion_from_axis_angle, quaternion_product};
 use crate::asset::{BODY_JOINT_COUNT, Pose};
 
-pub(super) const LEFT: usize = 0;
+pub(super) const LEFT_SIDE: usize = 0;
 
 /// Angles of one side of the body in degrees, as for the left side.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Side {
+pub(super) struct FigureSide {
     pub hip_flexion: f64,
     pub hip_abduction: f64,
     pub hip_turn: f64,
@@ -22,15 +22,15 @@ pub(super) struct Side {
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Figure {
-    pub sides: [Side; 2],
+pub(super) struct PoseFigure {
+    pub sides: [FigureSide; 2],
     /// Whole trunk: forward, turn, sideways.
     pub trunk: [f64; 3],
     pub head: [f64; 3],
     pub pelvis: [f64; 3],
 }
 
-impl Figure {
+impl PoseFigure {
     /// Its pose; angles may leave the limits of the joints.
     pub fn pose(&self) -> Pose {
         let mut pose = Pose::t_pose(BODY_JOINT_COUNT);
@@ -43,7 +43,7 @@ impl Figure {
         pose.rotations[12] = radians(self.head.map(|x| 0.5 * x));
         pose.rotations[15] = pose.rotations[12];
         for (i, side) in self.sides.iter().enumerate() {
-            let sign = if i == LEFT { 1.0 } else { -1.0 };
+            let sign = if i == LEFT_SIDE { 1.0 } else { -1.0 };
             let mut set = |joint: usize, v: [f64; 3]| {
                 pose.rotations[joint + i] = [v[0], sign * v[1], sign * v[2]].map(f64::to_radians);
             };

@@ -11,9 +11,9 @@ use rand_distr::{Distribution, StandardNormal};
 const BANDWIDTH: f64 = 8.0;
 
 /// The pelvis, whose tilt goes with the spine, and what stands on it.
-const TRUNK: [usize; 6] = [0, 3, 6, 9, 12, 15];
-const LEGS: [[usize; 4]; 2] = [[1, 4, 7, 10], [2, 5, 8, 11]];
-const ARMS: [[usize; 4]; 2] = [[13, 16, 18, 20], [14, 17, 19, 21]];
+const TRUNK_JOINTS: [usize; 6] = [0, 3, 6, 9, 12, 15];
+const LEGS_BY_SIDE: [[usize; 4]; 2] = [[1, 4, 7, 10], [2, 5, 8, 11]];
+const ARMS_BY_SIDE: [[usize; 4]; 2] = [[13, 16, 18, 20], [14, 17, 19, 21]];
 
 /// A kernel density over the limbs of recorded poses and of their mirror images.
 #[derive(Debug, Clone)]
@@ -39,10 +39,10 @@ impl LimbDensity {
     /// density given the first.
     pub fn sample<R: Rng + ?Sized>(&self, rng: &mut R) -> Pose {
         let mut pose = Pose::t_pose(BODY_JOINT_COUNT);
-        self.copy(&TRUNK, self.shares.sample(rng), &mut pose, rng);
-        self.copy(&LEGS[0], self.shares.sample(rng), &mut pose, rng);
-        self.copy(&LEGS[1], self.given(&LEGS[0], &pose, rng), &mut pose, rng);
-        for arm in &ARMS {
+        self.copy(&TRUNK_JOINTS, self.shares.sample(rng), &mut pose, rng);
+        self.copy(&LEGS_BY_SIDE[0], self.shares.sample(rng), &mut pose, rng);
+        self.copy(&LEGS_BY_SIDE[1], self.given(&LEGS_BY_SIDE[0], &pose, rng), &mut pose, rng);
+        for arm in &ARMS_BY_SIDE {
             self.copy(arm, self.shares.sample(rng), &mut pose, rng);
         }
         pose

@@ -26,47 +26,47 @@ const fn mirrored(l: JointLimits) -> JointLimits {
 }
 
 // x: flexion is negative (thigh forward); y: turn; z: abduction is positive on the left.
-const HIP: JointLimits = limits([-115.0, 25.0], [-35.0, 40.0], [-12.0, 40.0]);
+const HIP_LIMITS: JointLimits = limits([-115.0, 25.0], [-35.0, 40.0], [-12.0, 40.0]);
 // x: flexion, in one direction only.
-const KNEE: JointLimits = limits([0.0, 135.0], [-8.0, 8.0], [-5.0, 5.0]);
+const KNEE_LIMITS: JointLimits = limits([0.0, 135.0], [-8.0, 8.0], [-5.0, 5.0]);
 // x: toes down is positive.
-const ANKLE: JointLimits = limits([-20.0, 40.0], [-15.0, 15.0], [-15.0, 15.0]);
-const FOOT: JointLimits = limits([-35.0, 15.0], [-5.0, 5.0], [-5.0, 5.0]);
+const ANKLE_LIMITS: JointLimits = limits([-20.0, 40.0], [-15.0, 15.0], [-15.0, 15.0]);
+const FOOT_LIMITS: JointLimits = limits([-35.0, 15.0], [-5.0, 5.0], [-5.0, 5.0]);
 // x: bending forward is positive; three spine joints share the trunk's motion.
-const SPINE: JointLimits = limits([-12.0, 28.0], [-16.0, 16.0], [-13.0, 13.0]);
-const NECK: JointLimits = limits([-22.0, 28.0], [-35.0, 35.0], [-20.0, 20.0]);
+const SPINE_LIMITS: JointLimits = limits([-12.0, 28.0], [-16.0, 16.0], [-13.0, 13.0]);
+const NECK_LIMITS: JointLimits = limits([-22.0, 28.0], [-35.0, 35.0], [-20.0, 20.0]);
 // z: shrugging is positive on the left; y: pulling the shoulder forward is negative.
-const COLLAR: JointLimits = limits([-8.0, 8.0], [-18.0, 12.0], [-8.0, 22.0]);
+const COLLAR_LIMITS: JointLimits = limits([-8.0, 8.0], [-18.0, 12.0], [-8.0, 22.0]);
 // z: the arm hangs at about −75 and points up at about 80; y: across the chest is negative; x: twist.
-const SHOULDER: JointLimits = limits([-75.0, 75.0], [-105.0, 45.0], [-88.0, 80.0]);
+const SHOULDER_LIMITS: JointLimits = limits([-75.0, 75.0], [-105.0, 45.0], [-88.0, 80.0]);
 // y: flexion is negative on the left, in one direction only; x: turning the forearm.
-const ELBOW: JointLimits = limits([-70.0, 60.0], [-140.0, 0.0], [-6.0, 6.0]);
-const WRIST: JointLimits = limits([-15.0, 15.0], [-25.0, 20.0], [-60.0, 60.0]);
+const ELBOW_LIMITS: JointLimits = limits([-70.0, 60.0], [-140.0, 0.0], [-6.0, 6.0]);
+const WRIST_LIMITS: JointLimits = limits([-15.0, 15.0], [-25.0, 20.0], [-60.0, 60.0]);
 
 /// Limits of every body joint, in SMPL order. The pelvis may turn to any heading.
 pub const JOINT_LIMITS: [JointLimits; BODY_JOINT_COUNT] = [
     limits([-30.0, 45.0], [-180.0, 180.0], [-20.0, 20.0]),
-    HIP,
-    mirrored(HIP),
-    SPINE,
-    KNEE,
-    mirrored(KNEE),
-    SPINE,
-    ANKLE,
-    mirrored(ANKLE),
-    SPINE,
-    FOOT,
-    mirrored(FOOT),
-    NECK,
-    COLLAR,
-    mirrored(COLLAR),
-    NECK,
-    SHOULDER,
-    mirrored(SHOULDER),
-    ELBOW,
-    mirrored(ELBOW),
-    WRIST,
-    mirrored(WRIST),
+    HIP_LIMITS,
+    mirrored(HIP_LIMITS),
+    SPINE_LIMITS,
+    KNEE_LIMITS,
+    mirrored(KNEE_LIMITS),
+    SPINE_LIMITS,
+    ANKLE_LIMITS,
+    mirrored(ANKLE_LIMITS),
+    SPINE_LIMITS,
+    FOOT_LIMITS,
+    mirrored(FOOT_LIMITS),
+    NECK_LIMITS,
+    COLLAR_LIMITS,
+    mirrored(COLLAR_LIMITS),
+    NECK_LIMITS,
+    SHOULDER_LIMITS,
+    mirrored(SHOULDER_LIMITS),
+    ELBOW_LIMITS,
+    mirrored(ELBOW_LIMITS),
+    WRIST_LIMITS,
+    mirrored(WRIST_LIMITS),
 ];
 
 /// The pose with every component of the body joints clamped to [`JOINT_LIMITS`]; further joints are left alone.
@@ -81,7 +81,8 @@ pub fn limited(mut pose: Pose) -> Pose {
 }
 
 /// Whether every body joint is within [`JOINT_LIMITS`], to a millionth of a radian.
-pub fn is_within_limits(pose: &Pose) -> bool {
+#[cfg(test)]
+pub(crate) fn is_within_limits(pose: &Pose) -> bool {
     pose.rotations.iter().zip(&JOINT_LIMITS).all(|(rotation, limits)| {
         (0..3).all(|axis| {
             rotation[axis] >= limits.low[axis].to_radians() - 1e-6

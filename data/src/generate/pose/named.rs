@@ -1,6 +1,6 @@
 //! Poses that a name stands for, so that a drape needs no motion file.
 
-use super::figure::{Figure, Side};
+use super::figure::{FigureSide, PoseFigure};
 use super::limits::limited;
 use crate::asset::Pose;
 
@@ -9,19 +9,19 @@ pub const POSE_NAMES: [&str; 3] = ["standing", "walking", "reaching"];
 
 /// The pose of that name, within [`super::JOINT_LIMITS`]: arms hanging; a stride; one arm up.
 pub fn named_pose(name: &str) -> Option<Pose> {
-    let hanging = Side {
+    let hanging = FigureSide {
         hip_abduction: 3.0,
         knee: 5.0,
         hip_flexion: 2.5,
         arm_lowered: 64.0,
         elbow: 18.0,
-        ..Side::default()
+        ..FigureSide::default()
     };
     let figure = match name {
-        "standing" => Figure { sides: [hanging; 2], ..Figure::default() },
-        "walking" => Figure {
+        "standing" => PoseFigure { sides: [hanging; 2], ..PoseFigure::default() },
+        "walking" => PoseFigure {
             sides: [
-                Side {
+                FigureSide {
                     hip_flexion: 30.0,
                     knee: 9.0,
                     hip_abduction: 1.0,
@@ -29,7 +29,7 @@ pub fn named_pose(name: &str) -> Option<Pose> {
                     elbow: 22.0,
                     ..hanging
                 },
-                Side {
+                FigureSide {
                     hip_flexion: -14.0,
                     knee: 26.0,
                     hip_abduction: 1.0,
@@ -41,16 +41,16 @@ pub fn named_pose(name: &str) -> Option<Pose> {
             ],
             trunk: [5.0, -8.0, 0.0],
             head: [0.0, 6.0, 0.0],
-            ..Figure::default()
+            ..PoseFigure::default()
         },
-        "reaching" => Figure {
+        "reaching" => PoseFigure {
             sides: [
-                Side { arm_lowered: -50.0, arm_forward: 15.0, shrug: 14.0, elbow: 20.0, ..hanging },
-                Side { hip_abduction: 8.0, arm_forward: 22.0, elbow: 40.0, ..hanging },
+                FigureSide { arm_lowered: -50.0, arm_forward: 15.0, shrug: 14.0, elbow: 20.0, ..hanging },
+                FigureSide { hip_abduction: 8.0, arm_forward: 22.0, elbow: 40.0, ..hanging },
             ],
             trunk: [3.0, 12.0, -7.0],
             head: [-10.0, 14.0, 0.0],
-            ..Figure::default()
+            ..PoseFigure::default()
         },
         _ => return None,
     };

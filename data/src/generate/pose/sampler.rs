@@ -1,26 +1,17 @@
 //! Random poses that look like people: a few activities, each a few correlated factors, with noise on every joint.
 
-use super::figure::{Figure, LEFT};
+use super::figure::{LEFT_SIDE, PoseFigure};
 use super::limits::limited;
 use crate::asset::Pose;
-use crate::asset::rotation::{axis_angle_from_quaternion, quaternion_from_axis_angle, quaternion_product};
 use rand::{Rng, RngExt};
 use std::f64::consts::PI;
 
 /// Samples poses within [`super::JOINT_LIMITS`]: standing, walking, sitting, reaching, arms raised and bending.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PoseSampler {
-    /// Standard deviation of the independent noise per joint component, in degrees; knees and toes get half of it. Default 4.
-    pub noise_degrees: f64,
-    /// Whether the pelvis turns to a random heading. Default off: gravity and cloth do not see it.
-    pub random_heading: bool,
-}
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoseSampler;
 
-impl Default for PoseSampler {
-    fn default() -> Self {
-        Self { noise_degrees: 4.0, random_heading: false }
-    }
-}
+/// Standard deviation of the independent noise per joint component (degrees); knees and toes get half of it.
+const JOINT_NOISE: f64 = 4.0;
 
 fn normal<R: Rng + ?Sized>(rng: &mut R, mean: f64, deviation: f64) -> f64 {
     // Box–Muller; two uniform numbers per value keep the stream simple and reproducible.
@@ -55,23 +46,18 @@ impl PoseSampler {
         let mut pose = figure.pose();
         for (joint, rotation) in pose.rotations.iter_mut().enumerate().skip(1) {
             let deviation =
-                self.noise_degrees.to_radians() * if matches!(joint, 4 | 5 | 10 | 11) { 0.5 } else { 1.0 };
+                JOINT_NOISE.to_radians() * if matches!(joint, 4 | 5 | 10 | 11) { 0.5 } else { 1.0 };
             for component in rotation {
                 *component += normal(rng, 0.0, deviation).clamp(-2.5 * deviation, 2.5 * deviation);
             }
-        }
-        if self.random_heading {
-            let heading = quaternion_from_axis_angle([0.0, between(rng, -PI, PI), 0.0]);
-            let tilt = quaternion_from_axis_angle(pose.rotations[0]);
-            pose.rotations[0] = axis_angle_from_quaternion(quaternion_product(heading, tilt));
         }
         limited(pose)
     }
 }
 
 /// At ease: arms mostly down, weight on either leg.
-fn standing<R: Rng + ?Sized>(rng: &mut R) -> Figure {
-    let mut figure = Figure::default();
+fn standing<R: Rng + ?Sized>(rng: &mut R) -> PoseFigure {
+    let mut figure = PoseFigure::default();
     let lowered = normal(rng, 66.0, 9.0);
     let twist = normal(rng, 0.0, 7.0);
     figure.trunk = [normal(rng, 3.0, 6.0), normal(rng, 0.0, 11.0), normal(rng, 0.0, 6.0)];
@@ -93,12 +79,12 @@ fn standing<R: Rng + ?Sized>(rng: &mut R) -> Figure {
 }
 
 /// One moment of a gait: legs in opposite phase, arms against legs, the trunk turning with the arms.
-fn walk<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn walk<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     let phase = between(rng, 0.0, 2.0 * PI);
     let stride = between(rng, 12.0, 38.0);
     let speed = (stride - 12.0) / 26.0;
     for (i, side) in figure.sides.iter_mut().enumerate() {
-        let own = phase + if i == LEFT { 0.0 } else { PI };
+        let own = phase + if i == LEFT_SIDE { 0.0 } else { PI };
         side.hip_flexion = stride * own.sin() + 0.25 * stride;
         // The knee bends most while the leg swings forward.
         let swing = (own + 0.9).cos().max(0.0);
@@ -114,7 +100,7 @@ fn walk<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
 }
 
 /// On a seat or crouching, the knees together or apart.
-fn sit<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn sit<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     let depth = between(rng, 45.0, 95.0);
     let apart = between(rng, 2.0, 20.0);
     for side in &mut figure.sides {
@@ -131,7 +117,7 @@ fn sit<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
 }
 
 /// Leaning forward or to the side.
-fn bend<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn bend<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     figure.trunk = [between(rng, -15.0, 60.0), normal(rng, 0.0, 18.0), normal(rng, 0.0, 14.0)];
     let hinge = between(rng, 0.0, 30.0);
     figure.pelvis[0] = hinge;
@@ -143,7 +129,7 @@ fn bend<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
 }
 
 /// One or both arms sideways or up.
-fn raise_arms<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn raise_arms<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     let both = rng.random::<f64>() < 0.6;
     let lowered = between(rng, -70.0, 30.0);
     let only = usize::from(rng.random::<f64>() < 0.5);
@@ -158,7 +144,7 @@ fn raise_arms<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
 }
 
 /// One or both hands forward.
-fn reach<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn reach<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     let both = rng.random::<f64>() < 0.5;
     let only = usize::from(rng.random::<f64>() < 0.5);
     let forward = between(rng, 25.0, 85.0);
@@ -172,7 +158,7 @@ fn reach<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
 }
 
 /// Hands in front of the belly or chest.
-fn hands_together<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
+fn hands_together<R: Rng + ?Sized>(figure: &mut PoseFigure, rng: &mut R) {
     let elbow = between(rng, 50.0, 110.0);
     let forward = between(rng, 15.0, 45.0);
     for side in &mut figure.sides {
@@ -192,10 +178,9 @@ mod tests {
 
     #[test]
     fn poses_are_within_limits_deterministic_and_varied() {
-        let sampler = PoseSampler { random_heading: true, ..PoseSampler::default() };
         let sample = |seed| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            (0..500).map(|_| sampler.sample(&mut rng)).collect::<Vec<_>>()
+            (0..500).map(|_| PoseSampler.sample(&mut rng)).collect::<Vec<_>>()
         };
         let poses = sample(7);
         assert_eq!(poses, sample(7));
@@ -218,11 +203,10 @@ mod tests {
     fn hands_hang_below_the_shoulders_and_feet_stay_below_the_hips() {
         let body = mannequin();
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let sampler = PoseSampler::default();
         let count = 300;
         let mut low_hands = 0;
         for _ in 0..count {
-            let posed = body.posed(&[], &sampler.sample(&mut rng)).unwrap();
+            let posed = body.posed(&[], &PoseSampler.sample(&mut rng)).unwrap();
             let joints = posed.joints;
             low_hands += [(20, 16), (21, 17)].iter().filter(|(w, s)| joints[*w][1] < joints[*s][1]).count();
             assert!(joints[7][1] < joints[1][1] + 0.1 && joints[8][1] < joints[2][1] + 0.1);

@@ -12,13 +12,13 @@ use clothcombo_physics::contact::{TriangleTree, intersection_segment};
 use clothcombo_physics::vec3::{norm, sub};
 
 /// Joints between two parts, from which on they should not touch: upper arm and chest, or the thighs, always may.
-const APART: usize = 3;
+const JOINTS_APART: usize = 3;
 
 /// Measures self-intersections of one body in any pose.
 #[derive(Debug, Clone)]
 pub struct SelfContact {
-    /// Part by body joint.
-    parts: Vec<Part>,
+    /// Faces by body joint.
+    parts: Vec<JointFaces>,
     /// Pairs of parts that are far enough apart on the skeleton.
     pairs: Vec<[usize; 2]>,
     /// What the body crosses itself at rest (m).
@@ -27,7 +27,7 @@ pub struct SelfContact {
 
 /// The faces that follow one joint.
 #[derive(Debug, Clone, Default)]
-struct Part {
+struct JointFaces {
     /// Vertices of the body.
     vertices: Vec<u32>,
     /// Faces over `vertices`.
@@ -39,17 +39,17 @@ impl SelfContact {
     pub fn new(body: &Body) -> Self {
         let owner = dominant_joints(body);
         let count = body.joint_count().min(BODY_JOINT_COUNT);
-        let parts: Vec<Part> = (0..count)
+        let parts: Vec<JointFaces> = (0..count)
             .map(|joint| {
                 let faces = body.faces.iter().copied().filter(|face| owner[face[0] as usize] == joint);
                 let (vertices, faces) = compact(faces, body.vertex_count());
-                Part { vertices, faces }
+                JointFaces { vertices, faces }
             })
             .collect();
         let distance = joint_distances(&body.parents, count);
         let pairs = (0..count)
             .flat_map(|a| (a + 1..count).map(move |b| [a, b]))
-            .filter(|[a, b]| distance[*a][*b] >= APART)
+            .filter(|[a, b]| distance[*a][*b] >= JOINTS_APART)
             .filter(|pair| pair.iter().all(|p| !parts[*p].faces.is_empty()))
             .collect();
         let mut contact = Self { parts, pairs, rest: 0.0 };

@@ -1,14 +1,14 @@
 //! Acclaim motions (`.amc`): in every frame, a line of values for each bone that moves.
 
-use super::skeleton::Skeleton;
-use super::{lines, numbers};
+use super::skeleton::AcclaimSkeleton;
+use super::words::{lines, numbers};
 use crate::format::FileError;
 use crate::import::rig::check_angle;
 use std::collections::HashMap;
 use std::path::Path;
 
 /// The values of the channels of all joints of `skeleton`, frame by frame (degrees); `path` is for messages only.
-pub(super) fn parse(text: &str, path: &Path, skeleton: &Skeleton) -> Result<Vec<f64>, FileError> {
+pub(super) fn parse(text: &str, path: &Path, skeleton: &AcclaimSkeleton) -> Result<Vec<f64>, FileError> {
     // Where the values of a bone are in a frame.
     let mut starts = Vec::new();
     let mut count = 0;
@@ -79,7 +79,7 @@ pub(super) fn parse(text: &str, path: &Path, skeleton: &Skeleton) -> Result<Vec<
     Ok(values)
 }
 
-fn check_whole(skeleton: &Skeleton, given: &[bool], frame: f64) -> Result<(), String> {
+fn check_whole(skeleton: &AcclaimSkeleton, given: &[bool], frame: f64) -> Result<(), String> {
     match given.iter().position(|given| !given) {
         None => Ok(()),
         Some(bone) => {

@@ -5,7 +5,7 @@
 //! names: in `XYZ`, x first. Lengths, masses and limits are not needed: limits are of the software that solved the markers, and
 //! of the lengths only the direction between joints is used.
 
-use super::{lines, numbers};
+use super::words::{lines, numbers};
 use crate::asset::rotation::{IDENTITY, Matrix3, matrix_from_axis_angle, product};
 use crate::format::FileError;
 use crate::import::rig::{Channel, RigJoint, check_angle};
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// A bone; the first of a skeleton is its root.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Bone {
+pub(super) struct AcclaimBone {
     pub name: String,
     /// Where it begins in its file.
     line: usize,
@@ -33,23 +33,23 @@ pub(super) struct Bone {
 
 /// A skeleton.
 #[derive(Clone, Debug)]
-pub(super) struct Skeleton {
+pub(super) struct AcclaimSkeleton {
     /// Parents first.
-    pub bones: Vec<Bone>,
+    pub bones: Vec<AcclaimBone>,
     /// Whether angles are in radians where a motion does not say.
     pub radians: bool,
     /// Its file, for messages.
     pub path: PathBuf,
 }
 
-const ROOT: &str = "root";
+const ROOT_NAME: &str = "root";
 const XYZ: [usize; 3] = [0, 1, 2];
 
-impl Skeleton {
+impl AcclaimSkeleton {
     /// Parses ASF text; `path` is for messages only.
     pub fn parse(text: &str, path: &Path) -> Result<Self, FileError> {
-        let mut reader = Reader {
-            root: Bone { name: ROOT.into(), line: 1, order: XYZ, ..Bone::default() },
+        let mut reader = SkeletonReader {
+            root: AcclaimBone { name: ROOT_NAME.into(), line: 1, order: XYZ, ..AcclaimBone::default() },
             bones: Vec::new(),
             index: HashMap::new(),
             open: None,
@@ -72,7 +72,7 @@ impl Skeleton {
 
     /// The joints of the bones.
     pub fn joints(&self) -> Vec<RigJoint> {
-        let joint = |bone: &Bone| RigJoint {
+        let joint = |bone: &AcclaimBone| RigJoint {
             name: bone.name.clone(),
             parent: bone.parent,
             // A bone begins where its parent ends; where the root stands is all the same.
@@ -87,7 +87,7 @@ impl Skeleton {
     }
 }
 
-impl Bone {
+impl AcclaimBone {
     /// The places in `dof` of its channels, the outermost rotation, which is applied last, first.
     pub fn channels(&self) -> Vec<usize> {
         let place = |axis: &usize, rotates: bool| {
@@ -98,19 +98,19 @@ impl Bone {
     }
 }
 
-struct Reader<'a> {
-    root: Bone,
+struct SkeletonReader<'a> {
+    root: AcclaimBone,
     /// All bones but the root, in the order of the file.
-    bones: Vec<Bone>,
+    bones: Vec<AcclaimBone>,
     index: HashMap<String, usize>,
     /// The bone between `begin` and `end`, and which of its keys were read.
-    open: Option<(Bone, Vec<String>)>,
+    open: Option<(AcclaimBone, Vec<String>)>,
     /// Child, parent and line.
     parents: HashMap<&'a str, (&'a str, usize)>,
     radians: bool,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> SkeletonReader<'a> {
     fn line(&mut self, section: &str, line: usize, words: &[&'a str]) -> Result<(), String> {
         match section {
             "units" => self.unit(words),
@@ -143,7 +143,7 @@ impl<'a> Reader<'a> {
             "axis" => self.root.order = order(words.get(1).copied())?,
             "orientation" => {
                 self.root.offset = three(&words[1..], "orientation")?.map(|angle| self.degrees(angle));
-                self.root.offset.iter().try_for_each(|angle| check_angle(ROOT, *angle))?;
+                self.root.offset.iter().try_for_each(|angle| check_angle(ROOT_NAME, *angle))?;
             }
             // Where the body stands is all the same.
             _ => {}
@@ -155,7 +155,7 @@ impl<'a> Reader<'a> {
         let key = words[0].to_ascii_lowercase();
         match (key.as_str(), self.open.take()) {
             ("begin", None) => {
-                self.open = Some((Bone { line, order: XYZ, ..Bone::default() }, Vec::new()));
+                self.open = Some((AcclaimBone { line, order: XYZ, ..AcclaimBone::default() }, Vec::new()));
                 return Ok(());
             }
             ("begin", Some((bone, _))) => {
@@ -167,7 +167,8 @@ impl<'a> Reader<'a> {
                 {
                     return Err(format!("the bone that begins at line {} has no '{missing}'", bone.line));
                 }
-                if bone.name == ROOT || self.index.insert(bone.name.clone(), self.bones.len()).is_some() {
+                if bone.name == ROOT_NAME || self.index.insert(bone.name.clone(), self.bones.len()).is_some()
+                {
                     return Err(format!("there are two bones '{}'", bone.name));
                 }
                 self.bones.push(bone);
@@ -218,7 +219,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The bones, parents first, or the line that is wrong and why; `last` is the last line.
-    fn finish(self, last: usize) -> Result<Vec<Bone>, (usize, String)> {
+    fn finish(self, last: usize) -> Result<Vec<AcclaimBone>, (usize, String)> {
         if let Some((bone, _)) = self.open {
             return Err((last, format!("the file ends within the bone that begins at line {}", bone.line)));
         }
@@ -230,19 +231,19 @@ impl<'a> Reader<'a> {
         links.sort_unstable_by_key(|(child, (_, line))| (*line, *child));
         for (child, (parent, line)) in links {
             let unknown = |name: &str| (line, format!("no bone is called '{name}' in ':bonedata'"));
-            if parent != ROOT && !self.index.contains_key(parent) {
+            if parent != ROOT_NAME && !self.index.contains_key(parent) {
                 return Err(unknown(parent));
             }
             let child = *self.index.get(child).ok_or_else(|| unknown(child))?;
             children.entry(parent).or_default().push(child);
         }
-        let mut left: Vec<Option<Bone>> = self.bones.into_iter().map(Some).collect();
+        let mut left: Vec<Option<AcclaimBone>> = self.bones.into_iter().map(Some).collect();
         let mut taken = vec![self.root];
         let mut place = 0;
         while let Some(bone) = taken.get(place) {
             let own = children.remove(bone.name.as_str()).unwrap_or_default();
             let own = own.into_iter().filter_map(|child| left[child].take());
-            taken.extend(own.map(|bone| Bone { parent: Some(place), ..bone }).collect::<Vec<_>>());
+            taken.extend(own.map(|bone| AcclaimBone { parent: Some(place), ..bone }).collect::<Vec<_>>());
             place += 1;
         }
         match left.into_iter().flatten().next() {

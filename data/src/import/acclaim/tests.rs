@@ -74,7 +74,7 @@ foot 20 0
 ";
 
 fn parse(skeleton: &str, motion: &str) -> Result<Recording, String> {
-    let bones = Skeleton::parse(skeleton, Path::new("01.asf")).map_err(|e| e.to_string())?;
+    let bones = AcclaimSkeleton::parse(skeleton, Path::new("01.asf")).map_err(|e| e.to_string())?;
     let values = motion::parse(motion, Path::new("01_01.amc"), &bones).map_err(|e| e.to_string())?;
     Ok(Recording::new(bones.joints(), 120.0, values))
 }

@@ -44,8 +44,6 @@ pub struct SampleInfo {
     pub gender: Gender,
     /// Turn about the vertical axis that the rest garments carry (rad).
     pub zrot: f64,
-    /// Tightness of the upper and lower garment, as the data set defines it.
-    pub tightness: Vec<f64>,
     /// The garments.
     pub outfit: Vec<OutfitItem>,
 }
@@ -79,12 +77,8 @@ impl SampleInfo {
                 ));
             }
         };
-        let tightness = match file.get("tightness") {
-            Some(_) => numbers(file, "tightness")?.1,
-            None => Vec::new(),
-        };
         let (shape, zrot) = (numbers(file, "shape")?.1, scalar(file, "zrot")?);
-        Ok(Self { poses, shape, gender, zrot, tightness, outfit })
+        Ok(Self { poses, shape, gender, zrot, outfit })
     }
 }
 

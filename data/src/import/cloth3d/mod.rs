@@ -1,28 +1,26 @@
-//! CLOTH3D and CLOTH3D++ sample folders: garments on the zero body, poses as motions, and what was simulated.
+//! CLOTH3D and CLOTH3D++ sample folders: garments on the zero body, and poses as motions.
 //!
 //! Bertiche et al., "CLOTH3D: Clothed 3D Humans", 2020. A folder holds `info.mat`, a rest mesh `<Garment>.obj` for
-//! every key of its `outfit`, and the simulated vertices `<Garment>.pc16`. The rest meshes stand in a z-up world,
+//! every key of its `outfit`, and the simulated vertices `<Garment>.pc16`, which are not read. The rest meshes stand in a z-up world,
 //! turned by `zrot`, on an SMPL body of the sample's gender and shape with its legs apart and its root joint at the
 //! origin; here they are brought to the zero body in T-pose.
 
 mod info;
-mod manifest;
 mod unpose;
 
 pub use info::{Gender, OutfitItem, SampleInfo};
 pub use unpose::{Unposing, upright};
 
-use super::motions::{Clip, NamedFile, named, write_motions};
+use super::motions::{NamedFile, named, write_motions};
 use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
-use super::up_axis::UpAxis;
+use super::up_axis::WorldUp;
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
-use crate::folders::{FolderGarment, save_garment_folder};
-use crate::format::{FileError, NpzWriter, PointCache, folder, obj};
+use crate::folders::save_garment_folder;
+use crate::format::{FileError, folder, obj};
 use crate::mesh::contact;
 use clothcombo_physics::query::Surface;
-use manifest::{AUTHOR, GarmentEntry, LICENCE, SampleEntry};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -42,10 +40,8 @@ pub struct Cloth3dBodies<'a> {
 pub struct Cloth3dSettings {
     /// How garments are bound to the body for being unposed.
     pub binding: BindingSettings,
-    /// Which frames of the motions are kept; all where point caches are converted.
+    /// Which frames of the motions are kept.
     pub thinning: Thinning,
-    /// Convert the point caches as well.
-    pub caches: bool,
     /// The files that the bodies came from: folders with one of them are not written to.
     pub body_files: Vec<PathBuf>,
 }
@@ -53,16 +49,15 @@ pub struct Cloth3dSettings {
 impl Default for Cloth3dSettings {
     fn default() -> Self {
         let thinning = Thinning { frame_rate: FRAME_RATE, static_threshold: 0.5f64.to_radians() };
-        Self { binding: BindingSettings::default(), thinning, caches: false, body_files: Vec::new() }
+        Self { binding: BindingSettings::default(), thinning, body_files: Vec::new() }
     }
 }
 
 /// Of the simulations (frames/s).
 const FRAME_RATE: f64 = 30.0;
 
-/// Imports samples to `out`: `garments/*.obj` with `garments.toml`, `motions/*.npz` with `motions.toml`, `cloth3d.toml`
-/// with what the samples say of themselves, and, if asked for, `sequences/*.npz`. `inputs` are sample folders, or
-/// folders of them.
+/// Imports samples to `out`: `garments/*.obj` with `garments.toml`, and `motions/*.npz`. `inputs` are sample
+/// folders, or folders of them.
 ///
 /// # Errors
 /// [`ImportError`] if there is no sample, none of its garments can be used, or a result cannot be written.
@@ -91,18 +86,18 @@ pub fn import_cloth3d(
         )));
     }
     // Inputs lie in the samples' folders, results in these: none meet unless the folders do.
-    let outputs = ["garments", "motions", "sequences"].map(|folder| out.join(folder));
+    let outputs = ["garments", "motions"].map(|folder| out.join(folder));
     // A file that is named without its folder lies in one, too.
     let folder = |file: &PathBuf| fs::canonicalize(file).ok()?.parent().map(Path::to_path_buf);
     let of_bodies = settings.body_files.iter().filter_map(folder);
     refuse_overwriting(samples.iter().map(|sample| sample.path.clone()).chain(of_bodies), outputs)?;
     let mut summary = Summary { notes: assumptions(bodies), ..Summary::default() };
     let surface = Surface::new(target.template.clone(), target.faces.clone());
-    let (mut garments, mut entries) = (Vec::new(), Vec::new());
+    let (mut garments, mut clips) = (Vec::new(), Vec::new());
     for (done, sample) in samples.iter().enumerate() {
         progress("unposing garments", done, samples.len());
-        match import_sample(sample, bodies, &surface, out, settings, &mut garments, &mut summary)? {
-            Ok(entry) => entries.push(entry),
+        match import_sample(sample, bodies, &surface, settings, &mut garments, &mut summary) {
+            Ok(()) => clips.push(NamedFile { path: sample.path.join("info.mat"), name: sample.name.clone() }),
             Err(reason) => summary.skipped.push((sample.path.display().to_string(), reason)),
         }
     }
@@ -115,19 +110,12 @@ pub fn import_cloth3d(
         )));
     }
     summary.written.extend(save_garment_folder(&out.join("garments"), &garments)?);
-    let clips: Vec<NamedFile> = (samples.iter())
-        .filter(|s| entries.iter().any(|e| e.name == s.name))
-        .map(|s| NamedFile { path: s.path.join("info.mat"), name: s.name.clone() })
-        .collect();
     let import = |path: &Path| motion(path, settings);
     let motions = write_motions(&clips, None, &out.join("motions"), "info.mat files", &import, progress)?;
     summary.taken.extend(motions.taken.into_iter().map(|(name, note)| (format!("motion {name}"), note)));
     summary.skipped.extend(motions.skipped);
     summary.notes.extend(motions.notes);
     summary.written.extend(motions.written);
-    let path = out.join("cloth3d.toml");
-    manifest::add(&path, entries)?;
-    summary.written.push(path);
     Ok(summary)
 }
 
@@ -177,57 +165,35 @@ fn find_samples(inputs: &[PathBuf]) -> Result<Vec<NamedFile>, FileError> {
     })))
 }
 
-/// The garments of one sample; the inner error is the reason to skip it as a whole.
+/// The garments of one sample; the error is the reason to skip it as a whole.
 fn import_sample(
     sample: &NamedFile,
     bodies: &Cloth3dBodies<'_>,
     surface: &Surface<f64>,
-    out: &Path,
     settings: &Cloth3dSettings,
-    garments: &mut Vec<FolderGarment>,
+    garments: &mut Vec<Garment>,
     summary: &mut Summary,
-) -> Result<Result<SampleEntry, String>, ImportError> {
-    let info = match SampleInfo::load(&sample.path.join("info.mat")) {
-        Ok(info) => info,
-        Err(reason) => return Ok(Err(reason)),
-    };
+) -> Result<(), String> {
+    let info = SampleInfo::load(&sample.path.join("info.mat"))?;
     let of_gender = match info.gender {
         Gender::Female => bodies.female,
         Gender::Male => bodies.male,
     };
     let body = of_gender.unwrap_or(bodies.target);
     let known = if has_smpl_shape(body) { info.shape.len().min(body.shape_count) } else { 0 };
-    let unposing = match Unposing::new(body, &info.shape[..known], bodies.target) {
-        Ok(unposing) => unposing,
-        Err(reason) => return Ok(Err(reason)),
-    };
-    let mut entry = SampleEntry::new(&sample.name, &info);
+    let unposing = Unposing::new(body, &info.shape[..known], bodies.target)?;
     for item in &info.outfit {
         let mesh_path = sample.path.join(format!("{}.obj", item.name));
         match unposed_garment(sample, &info, item, &mesh_path, &unposing, bodies.target, settings) {
             Ok(garment) => {
                 let inside = contact(garment.rest.positions(), surface).inside;
                 summary.taken.push((garment.name.clone(), about(&garment, item, inside)));
-                let (frames, sequence) = if settings.caches {
-                    convert_cache(sample, item, &garment, out, summary)?
-                } else {
-                    (None, None)
-                };
-                entry.garment.push(GarmentEntry {
-                    name: item.name.clone(),
-                    file: format!("garments/{}.obj", garment.name),
-                    category: garment.category,
-                    fabric: item.fabric.clone(),
-                    simulated_frames: frames,
-                    sequence,
-                });
-                let path = PathBuf::from(format!("{}.obj", garment.name));
-                garments.push(FolderGarment { garment, layer: None, path });
+                garments.push(garment);
             }
             Err(reason) => summary.skipped.push((mesh_path.display().to_string(), reason)),
         }
     }
-    Ok(Ok(entry))
+    Ok(())
 }
 
 fn about(garment: &Garment, item: &OutfitItem, inside: usize) -> String {
@@ -282,55 +248,21 @@ fn category(name: &str) -> Option<Category> {
 }
 
 fn provenance(what: &str) -> Provenance {
-    Provenance { source: format!("CLOTH3D sample {what}"), author: AUTHOR.into(), licence: LICENCE.into() }
-}
-
-/// Converts one point cache: number of frames, and the file written. A cache that cannot be used is skipped; the garment is not.
-fn convert_cache(
-    sample: &NamedFile,
-    item: &OutfitItem,
-    garment: &Garment,
-    out: &Path,
-    summary: &mut Summary,
-) -> Result<(Option<usize>, Option<String>), ImportError> {
-    let path = sample.path.join(format!("{}.pc16", item.name));
-    let mut skip = |reason: String| summary.skipped.push((path.display().to_string(), reason));
-    let cache = match PointCache::load(&path) {
-        Ok(cache) => cache,
-        Err(e) => {
-            skip(e.to_string());
-            return Ok((None, None));
-        }
-    };
-    let vertices = garment.rest.vertex_count();
-    if cache.point_count != vertices {
-        skip(format!("{} points, but the garment has {vertices} vertices", cache.point_count));
-        return Ok((None, None));
+    Provenance {
+        source: format!("CLOTH3D sample {what}"),
+        author: "Bertiche, Madadi, Escalera (CLOTH3D)".into(),
+        licence: "CLOTH3D terms of use (non-commercial research)".into(),
     }
-    // z up to y up; exact.
-    let positions: Vec<f32> = cache.positions.iter().flat_map(|[x, y, z]| [*x, *z, -*y]).collect();
-    let file = format!("sequences/{}.npz", garment.name);
-    let mut npz = NpzWriter::new();
-    npz.f32("positions", &[cache.frame_count(), vertices, 3], &positions)
-        .u32("f", &[garment.rest.face_count(), 3], garment.rest.faces().as_flattened())
-        .f64("frame_rate", &[], &[FRAME_RATE]);
-    garment.source.write(&mut npz);
-    npz.save(&out.join(&file))?;
-    summary.written.push(out.join(&file));
-    Ok((Some(cache.frame_count()), Some(file)))
 }
 
 /// The poses of a sample as a motion.
-fn motion(info_mat: &Path, settings: &Cloth3dSettings) -> Result<Clip, String> {
+fn motion(info_mat: &Path, settings: &Cloth3dSettings) -> Result<(Motion, String), String> {
     let info = SampleInfo::load(info_mat)?;
     let mut poses = info.poses;
-    poses.iter_mut().for_each(|pose| UpAxis::Z.turn_root_to_y_up(pose));
-    // Simulated frames are matched with poses by their numbers.
-    let all = Thinning { frame_rate: FRAME_RATE, static_threshold: 0.0 };
-    let thinning = if settings.caches { &all } else { &settings.thinning };
-    let Thinned { poses, frame_rate, note } = thin(poses, FRAME_RATE, thinning);
+    poses.iter_mut().for_each(|pose| WorldUp::Z.turn_root_to_y_up(pose));
+    let Thinned { poses, frame_rate, note } = thin(poses, FRAME_RATE, &settings.thinning);
     let folder = info_mat.parent().and_then(Path::file_name).map(|f| f.to_string_lossy().into_owned());
     let source = provenance(&folder.unwrap_or_default());
     let motion = Motion { name: String::new(), frame_rate, poses, source };
-    Ok(Clip { motion, subject: info.gender.name().into(), note })
+    Ok((motion, format!("{}, {note}", info.gender.name())))
 }

@@ -3,11 +3,11 @@
 use crate::asset::body::unskin;
 use crate::asset::rotation::{Matrix3, apply, matrix_from_axis_angle, product};
 use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose};
-use crate::import::UpAxis;
+use crate::import::WorldUp;
 use clothcombo_physics::TriMesh;
 
 /// How far the legs are apart in the rest pose of CLOTH3D: θ₁ = (0, 0, 0.15), θ₂ = (0, 0, −0.15) (rad).
-const LEGS_APART: f64 = 0.15;
+const LEG_SPREAD: f64 = 0.15;
 
 /// Takes garments from one sample's rest body to the zero body of the data set.
 pub struct Unposing {
@@ -27,14 +27,12 @@ impl Unposing {
             return Err(format!("body '{}' is not the same mesh as body '{}'", body.name, target.name));
         }
         let mut pose = Pose::t_pose(3);
-        pose.rotations[1] = [0.0, 0.0, LEGS_APART];
-        pose.rotations[2] = [0.0, 0.0, -LEGS_APART];
+        pose.rotations[1] = [0.0, 0.0, LEG_SPREAD];
+        pose.rotations[2] = [0.0, 0.0, -LEG_SPREAD];
         let posed = body.posed(shape, &pose).map_err(|e| e.to_string())?;
         let mut displacement = Vec::with_capacity(3 * body.vertex_count());
         for (v, p) in posed.positions.iter().enumerate() {
-            let (joints, weights) = body.skin_weights.row(v);
-            let bones =
-                joints.iter().zip(weights).map(|(j, w)| (&posed.bones[usize::from(*j)], f64::from(*w)));
+            let bones = body.skin_weights.of_vertex(v).map(|(j, w)| (&posed.bones[j], f64::from(w)));
             let unposed = unskin(*p, bones)
                 .ok_or_else(|| format!("vertex {v} of body '{}' cannot be unposed", body.name))?;
             displacement.extend((0..3).map(|a| (unposed[a] - target.template[v][a]) as f32));
@@ -79,6 +77,6 @@ impl Unposing {
 
 /// A rest garment's points from the file's frame (z up, turned by `zrot`) to y up, facing +z.
 pub fn upright(positions: &mut [[f64; 3]], zrot: f64) {
-    let turn: Matrix3 = product(&UpAxis::Z.to_y_up(), &matrix_from_axis_angle([0.0, 0.0, -zrot]));
+    let turn: Matrix3 = product(&WorldUp::Z.to_y_up(), &matrix_from_axis_angle([0.0, 0.0, -zrot]));
     positions.iter_mut().for_each(|p| *p = apply(&turn, *p));
 }

@@ -4,21 +4,22 @@
 //! hang elsewhere: leg and arm joints lie on one path each, in order, and pelvis, spine, neck and head on the paths between them.
 //! The spine is what lies between pelvis and arms, whatever its joints are called and however many they are.
 
-use super::joint_name::{Meaning, Part, Side, without_common_prefix};
+use super::joint_name::{BodyPart, BodySide, Meaning, without_common_prefix};
 use super::recording::Recording;
 use crate::asset::skeleton::BODY_JOINT_NAMES;
 use crate::import::retarget::JointMap;
 
 /// Body joints of the limbs, from the trunk outwards.
-const LEGS: [(Side, [usize; 4]); 2] = [(Side::Left, [1, 4, 7, 10]), (Side::Right, [2, 5, 8, 11])];
-const ARMS: [(Side, [usize; 4]); 2] = [(Side::Left, [13, 16, 18, 20]), (Side::Right, [14, 17, 19, 21])];
+const LEGS: [(BodySide, [usize; 4]); 2] = [(BodySide::Left, [1, 4, 7, 10]), (BodySide::Right, [2, 5, 8, 11])];
+const ARMS: [(BodySide, [usize; 4]); 2] =
+    [(BodySide::Left, [13, 16, 18, 20]), (BodySide::Right, [14, 17, 19, 21])];
 const PELVIS: usize = 0;
 const SPINE: [usize; 3] = [3, 6, 9];
 const NECK: usize = 12;
 const HEAD: usize = 15;
 
 /// The body joints without which nothing can be retargeted, with one of the spine's, and neck or head.
-const REQUIRED: [usize; 13] = [0, 1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21];
+const REQUIRED_JOINTS: [usize; 13] = [0, 1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21];
 
 struct Rig<'a> {
     recording: &'a Recording,
@@ -35,8 +36,11 @@ pub fn resolve(recording: &Recording) -> JointMap {
 
 /// Names of the body joints that `map` lacks, and that are needed.
 pub fn missing(map: &JointMap) -> Vec<&'static str> {
-    let mut missing: Vec<&str> =
-        REQUIRED.into_iter().filter(|joint| map[*joint].is_none()).map(|j| BODY_JOINT_NAMES[j]).collect();
+    let mut missing: Vec<&str> = REQUIRED_JOINTS
+        .into_iter()
+        .filter(|joint| map[*joint].is_none())
+        .map(|j| BODY_JOINT_NAMES[j])
+        .collect();
     for one_of in [&SPINE[..], &[NECK, HEAD]] {
         if one_of.iter().all(|joint| map[*joint].is_none()) {
             missing.push(BODY_JOINT_NAMES[one_of[0]]);
@@ -49,11 +53,11 @@ impl Rig<'_> {
     fn map(&self) -> JointMap {
         let mut map: JointMap = [None; BODY_JOINT_NAMES.len()];
         for (side, joints) in LEGS {
-            let leg = self.limb(side, |part| if let Part::Leg(n) = part { Some(n) } else { None }, true);
+            let leg = self.limb(side, |part| if let BodyPart::Leg(n) = part { Some(n) } else { None }, true);
             joints.into_iter().zip(leg).for_each(|(joint, found)| map[joint] = found);
         }
         for (side, joints) in ARMS {
-            let arm = self.limb(side, |part| if let Part::Arm(n) = part { Some(n) } else { None }, false);
+            let arm = self.limb(side, |part| if let BodyPart::Arm(n) = part { Some(n) } else { None }, false);
             joints.into_iter().zip(arm).for_each(|(joint, found)| map[joint] = found);
         }
         // Where one joint of a limb is not known, the next one hangs from the same fork.
@@ -61,12 +65,12 @@ impl Rig<'_> {
         let [[left_leg, right_leg], [left_arm, right_arm]] =
             [LEGS, ARMS].map(|sides| sides.map(|(_, joints)| first(joints)));
         let Some(crotch) = self.fork(left_leg, right_leg) else { return map };
-        let named = self.path(crotch).into_iter().rev().find(|joint| self.is(*joint, Part::Pelvis));
+        let named = self.path(crotch).into_iter().rev().find(|joint| self.is(*joint, BodyPart::Pelvis));
         let pelvis = named.unwrap_or(crotch);
         map[PELVIS] = Some(pelvis);
         let Some(chest) = self.fork(left_arm, right_arm) else { return map };
         let Some(base) = self.fork(Some(pelvis), Some(chest)) else { return map };
-        let is_trunk = |joint: &usize| !self.is(*joint, Part::Neck) && !self.is(*joint, Part::Head);
+        let is_trunk = |joint: &usize| !self.is(*joint, BodyPart::Neck) && !self.is(*joint, BodyPart::Head);
         let spine: Vec<usize> = self
             .path(chest)
             .into_iter()
@@ -79,13 +83,13 @@ impl Rig<'_> {
         }
         let below = |joint: &usize| self.path(*joint).contains(&base);
         let all = || 0..self.meanings.len();
-        map[HEAD] = all().find(|joint| self.is(*joint, Part::Head) && below(joint));
+        map[HEAD] = all().find(|joint| self.is(*joint, BodyPart::Head) && below(joint));
         let above_head = |joint: &usize| map[HEAD].is_none_or(|head| self.path(head).contains(joint));
-        map[NECK] = all().find(|joint| self.is(*joint, Part::Neck) && below(joint) && above_head(joint));
+        map[NECK] = all().find(|joint| self.is(*joint, BodyPart::Neck) && below(joint) && above_head(joint));
         map
     }
 
-    fn is(&self, joint: usize, part: Part) -> bool {
+    fn is(&self, joint: usize, part: BodyPart) -> bool {
         self.meanings[joint].parts.contains(&part)
     }
 
@@ -106,7 +110,12 @@ impl Rig<'_> {
     /// The four joints of a limb: of all paths the one on which most of them are found. Of two candidates for the first joint the
     /// `deeper` one is taken if so (a hip joint may have one of its own above it), of those for the others the one nearer to the
     /// trunk.
-    fn limb(&self, side: Side, slot: impl Fn(Part) -> Option<usize>, deeper: bool) -> [Option<usize>; 4] {
+    fn limb(
+        &self,
+        side: BodySide,
+        slot: impl Fn(BodyPart) -> Option<usize>,
+        deeper: bool,
+    ) -> [Option<usize>; 4] {
         let slots = |joint: usize| -> Vec<usize> {
             let meaning = &self.meanings[joint];
             let parts = if meaning.side == Some(side) { &meaning.parts[..] } else { &[] };

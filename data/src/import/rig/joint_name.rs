@@ -6,7 +6,7 @@
 
 /// Side of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum BodySide {
     /// The subject's left.
     Left,
     /// The subject's right.
@@ -15,7 +15,7 @@ pub enum Side {
 
 /// A part of the body that a joint moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum BodyPart {
     /// The root of trunk and legs.
     Pelvis,
     /// The neck.
@@ -28,11 +28,11 @@ pub enum Part {
     Arm(usize),
 }
 
-use Part::{Arm, Head, Leg, Neck, Pelvis};
+use BodyPart::{Arm, Head, Leg, Neck, Pelvis};
 
 /// Names without their side, and the parts they may mean, the likeliest first. Collections: CMU, LAFAN1, Bandai-Namco, Mixamo,
 /// Rokoko, Perception Neuron, Xsens (BVH and segment names), OptiTrack, mocapbank, Poser, 3ds Max Biped, Unreal, ASF.
-const MEANINGS: [(&[&str], &[Part]); 15] = [
+const MEANINGS: [(&[&str], &[BodyPart]); 15] = [
     (&["pelvis", "hips", "hip", "hiproot", "root"], &[Pelvis]),
     (&["neck", "neck1", "neck01", "neckbase", "lowerneck", "cervical"], &[Neck]),
     (&["head", "skull", "headbase"], &[Head]),
@@ -51,17 +51,17 @@ const MEANINGS: [(&[&str], &[Part]); 15] = [
 ];
 
 /// Words that say nothing about the part.
-const NOISE: [&str; 9] = ["joint", "jnt", "j", "bone", "bn", "def", "jt", "skel", "sk"];
-const LEFT: [&str; 3] = ["left", "l", "lft"];
-const RIGHT: [&str; 3] = ["right", "r", "rgt"];
+const NOISE_WORDS: [&str; 9] = ["joint", "jnt", "j", "bone", "bn", "def", "jt", "skel", "sk"];
+const LEFT_WORDS: [&str; 3] = ["left", "l", "lft"];
+const RIGHT_WORDS: [&str; 3] = ["right", "r", "rgt"];
 
 /// What a name may mean.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Meaning {
     /// The side, if it has one.
-    pub side: Option<Side>,
+    pub side: Option<BodySide>,
     /// The parts, the likeliest first; empty for an unknown name.
-    pub parts: Vec<Part>,
+    pub parts: Vec<BodyPart>,
 }
 
 impl Meaning {
@@ -72,7 +72,8 @@ impl Meaning {
         if !with_noise.parts.is_empty() {
             return with_noise;
         }
-        let told: Vec<String> = words.into_iter().filter(|word| !NOISE.contains(&word.as_str())).collect();
+        let told: Vec<String> =
+            words.into_iter().filter(|word| !NOISE_WORDS.contains(&word.as_str())).collect();
         meaning(&told)
     }
 }
@@ -100,8 +101,8 @@ fn words(name: &str) -> Vec<String> {
 
 fn meaning(words: &[String]) -> Meaning {
     let side_of = |word: &str| match word {
-        _ if LEFT.contains(&word) => Some(Side::Left),
-        _ if RIGHT.contains(&word) => Some(Side::Right),
+        _ if LEFT_WORDS.contains(&word) => Some(BodySide::Left),
+        _ if RIGHT_WORDS.contains(&word) => Some(BodySide::Right),
         _ => None,
     };
     let mut side = words.iter().find_map(|word| side_of(word));
@@ -112,8 +113,8 @@ fn meaning(words: &[String]) -> Meaning {
             let after = |prefix: &str| rest.strip_prefix(prefix).filter(|rest| !parts(rest, true).is_empty());
             after(long).or_else(|| after(short).filter(|_| parts(&rest, false).is_empty())).map(str::to_owned)
         };
-        let found = cut("left", "l").map(|rest| (Side::Left, rest));
-        if let Some((found, cut)) = found.or_else(|| cut("right", "r").map(|rest| (Side::Right, rest))) {
+        let found = cut("left", "l").map(|rest| (BodySide::Left, rest));
+        if let Some((found, cut)) = found.or_else(|| cut("right", "r").map(|rest| (BodySide::Right, rest))) {
             (side, rest) = (Some(found), cut);
         }
     }
@@ -121,8 +122,8 @@ fn meaning(words: &[String]) -> Meaning {
 }
 
 /// The parts that `name`, without its side, may mean.
-fn parts(name: &str, is_sided: bool) -> Vec<Part> {
-    let fits = |part: &Part| is_sided == matches!(part, Leg(_) | Arm(_));
+fn parts(name: &str, is_sided: bool) -> Vec<BodyPart> {
+    let fits = |part: &BodyPart| is_sided == matches!(part, Leg(_) | Arm(_));
     let rows = MEANINGS.iter().filter(|(names, _)| names.contains(&name));
     rows.flat_map(|(_, parts)| parts.iter().copied().filter(fits)).collect()
 }
@@ -156,7 +157,7 @@ mod tests {
 
     #[test]
     fn names_of_every_kind_of_rig_are_understood() {
-        use Side::{Left, Right};
+        use BodySide::{Left, Right};
         for (name, side, part) in [
             ("LeftUpLeg", Some(Left), Leg(0)),
             ("RightUpperLeg", Some(Right), Leg(0)),

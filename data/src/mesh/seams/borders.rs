@@ -1,19 +1,19 @@
 //! Border edges of a sheet, where they lie along their loops, and which of them run along each other.
 
-use clothcombo_physics::mesh::DisjointSets;
-use clothcombo_physics::vec3::{add_scaled, cross, dot, norm, normalized, scale, sub};
+use crate::mesh::clean::pieces;
+use clothcombo_physics::vec3::{add_scaled, dot, norm, normalized, scale, sub};
 use std::collections::HashMap;
 
 /// Least cosine between the directions of two borders that run along each other.
-const ALONG: f64 = 0.7;
+const LEAST_ALONG: f64 = 0.7;
 /// Cosine from which two sheets lie on each other instead of continuing each other: the legs of trousers that touch, a lining.
 const FOLDED: f64 = 0.9;
 /// Two points of one loop face each other only if the way along it is this many times the distance: a corner is no seam.
 const DETOUR: f64 = 3.0;
 /// A longer edge, in cells of the grid, is no part of a seam.
-const LONGEST: f64 = 128.0;
+const LONGEST_SEAM_EDGE: f64 = 128.0;
 /// More edges in one cell of the grid are a heap, not a seam: comparing all of them would not end.
-const CROWD: usize = 512;
+const CROWDED_CELL: usize = 512;
 
 /// An edge with one face, in the face's direction.
 #[derive(Clone, Copy, Debug)]
@@ -59,11 +59,7 @@ impl<'a> Borders<'a> {
         let sides = |face: &[u32; 3]| [[face[0], face[1]], [face[1], face[2]], [face[2], face[0]]];
         let key = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
         faces.iter().flat_map(sides).for_each(|side| *uses.entry(key(side)).or_default() += 1);
-        let mut components = DisjointSets::new(positions.len());
-        for face in faces {
-            components.join(face[0], face[1]);
-            components.join(face[0], face[2]);
-        }
+        let mut components = pieces(faces, positions.len());
         let mut edges = Vec::new();
         for (number, face) in faces.iter().enumerate() {
             for side in sides(face).into_iter().filter(|side| uses[&key(*side)] == 1) {
@@ -122,14 +118,14 @@ impl<'a> Borders<'a> {
         }
         for (edge, number) in self.edges.iter().zip(0..) {
             let steps = (2.0 * edge.length / self.cell).ceil().max(1.0);
-            if steps > LONGEST {
+            if steps > LONGEST_SEAM_EDGE {
                 continue;
             }
             let start = self.positions[edge.ends[0] as usize];
             for step in 0..=steps as u32 {
                 let at = add_scaled(start, edge.length * f64::from(step) / steps, edge.direction);
                 let list = self.grid.entry(at.map(|x| (x / self.cell).floor() as i64)).or_default();
-                if list.last() != Some(&number) && list.len() < CROWD {
+                if list.last() != Some(&number) && list.len() < CROWDED_CELL {
                     list.push(number);
                 }
             }
@@ -187,7 +183,8 @@ impl<'a> Borders<'a> {
                 }
                 let cosine = dot(own.direction, other.direction);
                 // Sheets of one piece agree on a side: where their borders run in one direction, joining them twists it.
-                let is_along = if own.component == other.component { -cosine } else { cosine.abs() } >= ALONG;
+                let is_along =
+                    if own.component == other.component { -cosine } else { cosine.abs() } >= LEAST_ALONG;
                 let continues = dot(own.inward, other.inward) < FOLDED;
                 if is_along && continues && self.is_detour((edge, share), (*number, share_there), distance) {
                     best = Some(Facing { edge: *number, share: share_there, distance });
@@ -196,12 +193,6 @@ impl<'a> Borders<'a> {
         }
         best
     }
-}
-
-/// Unit normal of a face with its vertices at `positions`, times twice its area.
-pub(super) fn doubled_area(face: [u32; 3], position: impl Fn(u32) -> [f64; 3]) -> [f64; 3] {
-    let [a, b, c] = face.map(position);
-    cross(sub(b, a), sub(c, a))
 }
 
 /// The mean of some points; the origin for none.

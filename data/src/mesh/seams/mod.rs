@@ -9,8 +9,9 @@ mod runs;
 mod stitch;
 
 use borders::Borders;
+pub use runs::Seam;
 use runs::{runs, seams};
-use stitch::stitch;
+use stitch::{Stitched, stitch};
 
 /// Borders closer than this share of the median border edge coincide.
 pub const COINCIDE_SHARE: f64 = 0.05;
@@ -18,21 +19,6 @@ pub const COINCIDE_SHARE: f64 = 0.05;
 const LEAST_EDGES: f64 = 2.0;
 /// A seam is longer than this many times the gap.
 const LEAST_SLENDERNESS: f64 = 3.0;
-
-/// Two borders along each other.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seam {
-    /// Length (in the unit of the positions, as the others).
-    pub length: f64,
-    /// Median distance between the borders.
-    pub gap: f64,
-    /// Largest distance between them.
-    pub widest: f64,
-    /// First and last vertex of one of the borders, as they were before.
-    pub ends: [u32; 2],
-    /// Whether most of it was joined.
-    pub is_joined: bool,
-}
 
 /// A sheet after its seams were joined.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -62,15 +48,9 @@ pub fn join_seams(positions: &[[f64; 3]], faces: &[[u32; 3]], reach: Option<f64>
     let least = (LEAST_EDGES * median).max(LEAST_SLENDERNESS * reach);
     let (runs, facing) = runs(&borders, reach, least);
     let stitched = stitch(&borders, faces, &runs, &facing, reach)?;
-    let mut seams = seams(&borders, &runs, &facing, |v| stitched.joined[v as usize]);
-    seams.sort_by(|a, b| b.length.total_cmp(&a.length));
-    Some(JoinedSheet {
-        positions: stitched.positions,
-        faces: stitched.faces,
-        parent: stitched.parent,
-        became: stitched.became,
-        seams,
-    })
+    let seams = seams(&borders, &runs, &facing, |v| stitched.joined[v as usize]);
+    let Stitched { positions, faces, parent, became, .. } = stitched;
+    Some(JoinedSheet { positions, faces, parent, became, seams })
 }
 
 /// Borders that run along each other within `reach` and at least over `least`, the longest first.
@@ -80,9 +60,7 @@ pub fn open_seams(positions: &[[f64; 3]], faces: &[[u32; 3]], reach: f64, least:
     }
     let borders = Borders::new(positions, faces, reach);
     let (runs, facing) = runs(&borders, reach, least.max(LEAST_SLENDERNESS * reach));
-    let mut seams = seams(&borders, &runs, &facing, |_| false);
-    seams.sort_by(|a, b| b.length.total_cmp(&a.length));
-    seams
+    seams(&borders, &runs, &facing, |_| false)
 }
 
 #[cfg(test)]

@@ -1,7 +1,21 @@
 //! Stretches of border that run along another border.
 
-use super::Seam;
 use super::borders::{Borders, Facing};
+
+/// Two borders along each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seam {
+    /// Length (in the unit of the positions, as the others).
+    pub length: f64,
+    /// Median distance between the borders.
+    pub gap: f64,
+    /// Largest distance between them.
+    pub widest: f64,
+    /// First and last vertex of one of the borders, as they were before.
+    pub ends: [u32; 2],
+    /// Whether most of it was joined.
+    pub is_joined: bool,
+}
 
 /// A stretch of border whose every edge faces another one.
 #[derive(Debug)]
@@ -48,7 +62,7 @@ pub(super) fn runs(borders: &Borders, reach: f64, least: f64) -> (Vec<Run>, Faci
     (runs, facing)
 }
 
-/// The runs as seams, each pair of borders once. `is_joined` says of a vertex whether it was joined to another one.
+/// The runs as seams, the longest first, each pair of borders once. `is_joined` says of a vertex whether it was joined to another one.
 pub(super) fn seams(
     borders: &Borders,
     runs: &[Run],
@@ -83,5 +97,6 @@ pub(super) fn seams(
             is_joined: 2 * joined > vertices.len(),
         });
     }
+    seams.sort_by(|a, b| b.length.total_cmp(&a.length));
     seams
 }

@@ -1,9 +1,10 @@
 //! Two borders become one: vertices become one vertex, and vertices that face an edge split it.
 
-use super::borders::{Borders, Facing, doubled_area, mean};
+use super::borders::{Borders, Facing, mean};
 use super::runs::{FacingEdges, Run};
 use crate::mesh::AREA_SHARE;
 use crate::mesh::clean::diagonal;
+use crate::mesh::triangle::triangle_normal;
 use clothcombo_physics::mesh::DisjointSets;
 use clothcombo_physics::vec3::{dot, norm, sub};
 use std::collections::{HashMap, HashSet};
@@ -13,7 +14,7 @@ const SNAP: f64 = 0.2;
 /// Least cosine between the normals of a face before and after.
 const LEAST_TURN: f64 = 0.2;
 /// Attempts, each without what spoiled the one before.
-const ATTEMPTS: usize = 12;
+const STITCH_ATTEMPTS: usize = 12;
 
 /// A sheet whose borders were stitched, over the old vertices.
 #[derive(Debug)]
@@ -43,8 +44,8 @@ pub(super) fn stitch(
         contacts.extend([(ends[0], *e, first), (ends[1], *e, second)]);
     }
     let mut banned = HashSet::new();
-    for _ in 0..ATTEMPTS {
-        let plan = Plan::new(borders, &contacts, &banned, reach);
+    for _ in 0..STITCH_ATTEMPTS {
+        let plan = StitchPlan::new(borders, &contacts, &banned, reach);
         if !plan.joined.contains(&true) {
             return None;
         }
@@ -63,7 +64,7 @@ pub(super) fn stitch(
 }
 
 /// Which vertices become one, and which split an edge.
-struct Plan {
+struct StitchPlan {
     became: Vec<u32>,
     joined: Vec<bool>,
     /// Per border edge the vertices that split it, by their share of it.
@@ -72,7 +73,7 @@ struct Plan {
     pulls: HashMap<u32, Vec<[f64; 3]>>,
 }
 
-impl Plan {
+impl StitchPlan {
     fn new(borders: &Borders, contacts: &[(u32, u32, Facing)], banned: &HashSet<u32>, reach: f64) -> Self {
         let position = |v: u32| borders.positions[v as usize];
         let distance = |a: u32, b: u32| norm(sub(position(a), position(b)));
@@ -196,8 +197,8 @@ fn spoiled(old: &[[f64; 3]], faces: &[[u32; 3]], new: &Stitched) -> HashSet<u32>
         for [a, b] in [[a, b], [b, c], [c, a]] {
             uses.entry([a.min(b), a.max(b)]).or_default().push(*parent);
         }
-        let before = doubled_area(faces[*parent as usize], |v| old[v as usize]);
-        let after = doubled_area(*face, |v| new.positions[v as usize]);
+        let before = triangle_normal(faces[*parent as usize].map(|v| old[v as usize]));
+        let after = triangle_normal(face.map(|v| new.positions[v as usize]));
         let is_flat = a == b || b == c || c == a || norm(after) <= least;
         if is_flat || dot(before, after) < LEAST_TURN * norm(before) * norm(after) {
             spoiled.extend(faces[*parent as usize]);

@@ -2,15 +2,16 @@
 //! Choi, "3D medial axis point approximation using nearest neighbors and the normal field", The Visual Computer 2012) touches the
 //! opposite sheet at its other end.
 
+use crate::mesh::triangle::triangle_normal;
 use clothcombo_physics::query::ClosestPoint;
-use clothcombo_physics::vec3::{add, add_scaled, cross, dot, norm, norm_squared, scale, sub};
+use clothcombo_physics::vec3::{add, add_scaled, dot, norm, norm_squared, scale, sub};
 
 /// Least cosine between the normal of a face and the reverse normal of what it faces.
 const REVERSE: f64 = 0.7;
 /// The ball's other end lies within this cosine straight behind the face.
 const STRAIGHT: f64 = 0.8;
 /// Steps until the ball shrinks no more; few are needed.
-const STEPS: usize = 12;
+const SHRINKING_STEPS: usize = 12;
 
 /// The other side of the cloth.
 #[derive(Clone, Copy, Debug)]
@@ -22,8 +23,8 @@ pub(super) struct Opposite {
 
 /// Centre of a face and its normal, twice as long as its area.
 pub(super) fn centre_and_normal(positions: &[[f64; 3]], face: [u32; 3]) -> ([f64; 3], [f64; 3]) {
-    let [a, b, c] = face.map(|v| positions[v as usize]);
-    (scale(add(add(a, b), c), 1.0 / 3.0), cross(sub(b, a), sub(c, a)))
+    let corners @ [a, b, c] = face.map(|v| positions[v as usize]);
+    (scale(add(add(a, b), c), 1.0 / 3.0), triangle_normal(corners))
 }
 
 /// The sheet that face `number` has straight behind it within `limit`.
@@ -42,7 +43,7 @@ pub(super) fn opposite(
     let normal = scale(normal, 1.0 / length);
     let mut radius = 0.5 * limit;
     let mut touched = None;
-    for _ in 0..STEPS {
+    for _ in 0..SHRINKING_STEPS {
         let centre = add_scaled(p, -radius, normal);
         let found = surface.project(centre)?;
         // Nothing but the face itself: the ball is as large as it gets.

@@ -3,8 +3,7 @@
 mod facing;
 mod labels;
 
-use crate::mesh::clean::diagonal;
-use clothcombo_physics::mesh::DisjointSets;
+use crate::mesh::clean::{diagonal, pieces};
 use clothcombo_physics::query::ClosestPoint;
 use clothcombo_physics::vec3::{norm, sub};
 use facing::{Opposite, centre_and_normal, opposite};
@@ -15,7 +14,7 @@ use std::collections::{BTreeMap, HashMap};
 /// Cloth is thinner than this share of the diagonal: 25 mm for a garment of a metre.
 const MOST_SHARE: f64 = 0.025;
 /// Faces of which the thickness is measured to find out whether there is any.
-const SAMPLES: usize = 400;
+const SAMPLED_FACES: usize = 400;
 /// Share of the area that faces another sheet, from which cloth is thick.
 const THICK_SHARE: f64 = 0.7;
 /// A surface is nearly closed if its border is shorter than this many times the root of its area.
@@ -35,12 +34,8 @@ pub fn thickness(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Option<f64> {
         return None;
     }
     let surface = ClosestPoint::new(positions.to_vec(), faces);
-    let mut pieces = DisjointSets::new(positions.len());
-    faces.iter().for_each(|f| {
-        pieces.join(f[0], f[1]);
-        pieces.join(f[0], f[2]);
-    });
-    let step = (faces.len() / SAMPLES).max(1);
+    let mut pieces = pieces(faces, positions.len());
+    let step = (faces.len() / SAMPLED_FACES).max(1);
     let sampled: Vec<u32> = (0..faces.len() as u32).step_by(step).collect();
     let found: Vec<Option<Opposite>> =
         sampled.par_iter().map(|f| opposite(&surface, positions, faces, *f, limit)).collect();
@@ -69,11 +64,7 @@ pub fn thickness(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Option<f64> {
 /// positions): most of the area has another large piece next to it.
 pub fn sheets(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Option<f64> {
     let limit = MOST_SHARE * diagonal(positions);
-    let mut pieces = DisjointSets::new(positions.len());
-    faces.iter().for_each(|f| {
-        pieces.join(f[0], f[1]);
-        pieces.join(f[0], f[2]);
-    });
+    let mut pieces = pieces(faces, positions.len());
     let area = |f: &[u32; 3]| norm(centre_and_normal(positions, *f).1);
     let mut of_piece: BTreeMap<u32, (f64, Vec<[u32; 3]>)> = BTreeMap::new();
     for f in faces {
@@ -91,7 +82,7 @@ pub fn sheets(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Option<f64> {
         large.iter().map(|list| ClosestPoint::new(positions.to_vec(), list)).collect();
     let (mut near, mut sampled, mut distances) = (0.0, 0.0, Vec::new());
     for (own, list) in large.iter().enumerate() {
-        for f in list.iter().step_by((faces.len() / SAMPLES).max(1)) {
+        for f in list.iter().step_by((faces.len() / SAMPLED_FACES).max(1)) {
             let centre = centre_and_normal(positions, *f).0;
             let others = surfaces.iter().enumerate().filter(|(other, _)| *other != own);
             let distance = others
@@ -144,12 +135,7 @@ pub fn outer_sheet(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<u32> {
 }
 
 fn without_bits(positions: &[[f64; 3]], faces: &[[u32; 3]], outer: Vec<u32>) -> Vec<u32> {
-    let mut pieces = DisjointSets::new(positions.len());
-    for f in &outer {
-        let [a, b, c] = faces[*f as usize];
-        pieces.join(a, b);
-        pieces.join(a, c);
-    }
+    let mut pieces = pieces(outer.iter().map(|f| &faces[*f as usize]), positions.len());
     let area = |f: u32| norm(centre_and_normal(positions, faces[f as usize]).1);
     let mut areas = vec![0.0; positions.len()];
     outer.iter().for_each(|f| areas[pieces.root(faces[*f as usize][0]) as usize] += area(*f));

@@ -5,7 +5,7 @@ use crate::cli::table::{Row, row, table};
 use crate::cli::verbosity::progress_bar;
 use crate::dataset::load_body;
 use clap::Args;
-use clothcombo_data::degenerate_cases::{CaseReport, DegenerateCases, Expectation, Outcome, TermReport};
+use clothcombo_data::degenerate_cases::{CaseOutcome, CaseReport, DegenerateCases, Expectation, TermReport};
 use clothcombo_physics::energy::{EnergySettings, Term, TermMap};
 use miette::{IntoDiagnostic, Report, miette};
 use serde_json::{Value, json};
@@ -80,13 +80,13 @@ fn json_row(report: &CaseReport) -> Value {
         "faults": report.faults(),
     });
     match &report.outcome {
-        Outcome::Evaluated(terms) => {
+        CaseOutcome::Evaluated(terms) => {
             let evaluated = terms
                 .iter()
                 .filter_map(|(term, report)| Some((term.name().to_owned(), json!(report.as_ref()?))));
             row["terms"] = Value::Object(evaluated.collect());
         }
-        Outcome::Refused(error) => row["error"] = json!(error.to_string()),
+        CaseOutcome::Refused(error) => row["error"] = json!(error.to_string()),
     }
     row
 }
@@ -99,7 +99,7 @@ fn worst(terms: &TermMap<Option<TermReport>>, number: impl Fn(&TermReport) -> f6
 
 fn text(reports: &[CaseReport]) -> String {
     // Refused cases have other columns than evaluated ones.
-    let is_refused = |report: &&CaseReport| matches!(report.outcome, Outcome::Refused(_));
+    let is_refused = |report: &&CaseReport| matches!(report.outcome, CaseOutcome::Refused(_));
     let (refused, evaluated): (Vec<_>, Vec<_>) = reports.iter().partition(is_refused);
     let cases = |reports: Vec<&CaseReport>| table(&reports.into_iter().map(case_row).collect::<Vec<_>>());
     let tables = [cases(evaluated), cases(refused), table(&Term::ALL.map(|term| term_row(term, reports)))];
@@ -111,8 +111,8 @@ fn case_row(report: &CaseReport) -> Row {
     let kept = if faults.is_empty() { "kept".to_owned() } else { format!("BROKEN: {}", faults.join("; ")) };
     let name = report.case.name;
     let terms = match &report.outcome {
-        Outcome::Evaluated(terms) => terms,
-        Outcome::Refused(error) => {
+        CaseOutcome::Evaluated(terms) => terms,
+        CaseOutcome::Refused(error) => {
             let refused = match report.case.expectation {
                 Expectation::Refused(_) => "refused",
                 Expectation::Bounded => "REFUSED",
@@ -141,8 +141,8 @@ fn case_row(report: &CaseReport) -> Row {
 fn term_row(term: Term, reports: &[CaseReport]) -> Row {
     let of_term = || {
         reports.iter().filter_map(|report| match &report.outcome {
-            Outcome::Evaluated(terms) => terms[term],
-            Outcome::Refused(_) => None,
+            CaseOutcome::Evaluated(terms) => terms[term],
+            CaseOutcome::Refused(_) => None,
         })
     };
     let largest = |number: fn(&TermReport) -> f64| of_term().map(|r| number(&r)).fold(0.0, f64::max);

@@ -149,7 +149,7 @@ mod tests {
         let motions = folder.join("motions");
         std::fs::create_dir_all(&motions).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let poses = (0..600).map(|_| PoseSampler::default().sample(&mut rng)).collect();
+        let poses = (0..600).map(|_| PoseSampler.sample(&mut rng)).collect();
         let (name, source) = ("walk".to_owned(), Provenance::default());
         Motion { name, frame_rate: 10.0, poses, source }.save(&motions.join("walk.npz")).unwrap();
         let text = format!(

@@ -186,16 +186,15 @@ fn write_scene(path: &Path, show: &Show) -> Result<(), FileError> {
 mod tests {
     use super::*;
     use clothcombo_data::asset::Category;
-    use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
+    use clothcombo_data::generate::{GarmentGenerator, mannequin};
 
     #[test]
     fn what_cannot_be_repeated_of_a_given_file_is_told_with_the_reason() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tee.obj");
         let body = mannequin();
-        let settings = GarmentSettings { target_vertices: 250, ..GarmentSettings::default() };
         let generator = GarmentGenerator::new(&body).unwrap();
-        let garment = generator.generate(Category::TShirt, 0, &settings).unwrap();
+        let garment = generator.generate(Category::TShirt, 0, 250).unwrap();
         let positions = garment.rest.positions().to_vec();
         obj::save(&path, &positions, garment.rest.faces(), &[]).unwrap();
         let mut source = GivenGarment::new(garment);

@@ -74,7 +74,7 @@ fn rates_are_found_under_every_name_and_contradictions_are_told() {
         arrays.extend_from_slice(rates);
         read(&arrays)
     };
-    for key in RATES {
+    for key in RATE_KEYS {
         assert_eq!(with(&[(key, &[], &[30.0])]).unwrap().rate, Some((key, 30.0)));
         assert_eq!(with(&[(key, &[1], &[59.94])]).unwrap().rate, Some((key, 59.94)));
     }
