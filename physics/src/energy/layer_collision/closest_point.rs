@@ -17,7 +17,7 @@
 
 use rayon::prelude::*;
 
-use super::OuterPoints;
+use super::outer_points::OuterPoints;
 use crate::energy::curvature::outer as dyad;
 use crate::energy::elements::GRAIN;
 use crate::energy::{CurvatureSink, EnergySettings, LayerGate, Weighted};

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::OuterPoints;
+use super::outer_points::OuterPoints;
 use crate::energy::elements::GRAIN;
 use crate::energy::{EnergySettings, LayerGate, Weighted};
 use crate::mesh::TriMesh;
@@ -32,11 +32,12 @@ pub const COLLAPSE_FLOOR: f64 = 1e-6;
 /// What stays the same of an inner garment.
 #[derive(Debug, Clone)]
 pub struct InnerVertices {
-    faces: Arc<[[u32; 3]]>,
+    pub(super) faces: Arc<[[u32; 3]]>,
     corners_at: CompressedRows<u32>,
     /// τ² per vertex (m⁴).
     collapse_squared: Vec<f64>,
-    median_edge: f64,
+    /// Of the rest shape (m).
+    pub(super) median_edge: f64,
 }
 
 /// Posed normals and index of an inner garment.
@@ -59,7 +60,8 @@ struct Contact {
 const NO_CONTACT: Contact = Contact { inner: 0, energy: 0.0, slope: 0.0 };
 
 impl InnerVertices {
-    pub(super) fn with_median_edge(rest: &TriMesh, median_edge: f64) -> Self {
+    pub(super) fn new(rest: &TriMesh) -> Self {
+        let median_edge = rest.median_edge_length();
         let faces: Arc<[[u32; 3]]> = rest.faces().into();
         let corners_at = corners_at_vertices(rest.vertex_count(), &faces);
         let floor = COLLAPSE_FLOOR * median_edge * median_edge;
@@ -68,15 +70,6 @@ impl InnerVertices {
             .map(|n| (COLLAPSE_RATIO * norm(n)).max(floor).powi(2))
             .collect();
         Self { faces, corners_at, collapse_squared, median_edge }
-    }
-
-    /// Median edge of the rest shape (m).
-    pub(super) fn median_edge(&self) -> f64 {
-        self.median_edge
-    }
-
-    pub(super) fn faces(&self) -> &Arc<[[u32; 3]]> {
-        &self.faces
     }
 
     pub(super) fn posed<T: Real>(&self, positions: &[[T; 3]]) -> PosedVertices<T> {

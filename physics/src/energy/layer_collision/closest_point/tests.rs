@@ -15,7 +15,7 @@ fn settings() -> EnergySettings {
 }
 
 fn garment(mesh: &TriMesh) -> InnerLayer {
-    InnerLayer::new(mesh, &Topology::new(mesh), mesh.median_edge_length())
+    InnerLayer::new(mesh, &Topology::new(mesh))
 }
 
 /// Points without a garment.
