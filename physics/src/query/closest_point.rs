@@ -5,12 +5,11 @@
 //! TVCG 2005). All of it is `f64`, whatever the caller's scalar: the sign must not depend on rounding.
 
 use parry3d_f64::bounding_volume::Aabb;
-use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 
 use super::pseudo_normal::PseudoNormals;
 use super::triangle_point::{Feature, TrianglePoint, box_distance_squared, closest_on_triangle};
-use super::triangle_tree::TriangleTree;
+use super::triangle_tree::{TriangleTree, triangle_box};
 use crate::rows::{CompressedRows, faces_at_vertices};
 use crate::vec3;
 
@@ -165,12 +164,6 @@ impl ClosestPoint {
         let normals = PseudoNormals { positions, faces, at_vertex };
         normals.at(face, feature)
     }
-}
-
-/// The smallest box around a triangle.
-fn triangle_box(corners: [[f64; 3]; 3]) -> Aabb {
-    let [a, b, c] = corners.map(Vector::from_array);
-    Aabb::new(a.min(b).min(c), a.max(b).max(c))
 }
 
 #[cfg(test)]

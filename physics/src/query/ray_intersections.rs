@@ -1,7 +1,7 @@
 //! Winding numbers of closed surfaces, by the faces that a ray intersects.
 
 use crate::rows::CompressedRows;
-use crate::vec3::{cross, dot, sub};
+use crate::vec3::{bounds, cross, dot, sub};
 
 /// Cells of the grid for each face, at most…
 const CELLS_PER_FACE: f64 = 0.5;
@@ -79,20 +79,20 @@ fn is_left(a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> bool {
 /// O(F log F): every body in another pose asks a few hundred questions only.
 #[derive(Debug)]
 struct Columns {
-    axes: [Axis; 2],
+    axes: [GridAxis; 2],
     /// The faces of every cell.
     faces: CompressedRows<u32>,
 }
 
 /// One side of the grid.
 #[derive(Clone, Copy, Debug)]
-struct Axis {
+struct GridAxis {
     low: f64,
     high: f64,
     count: usize,
 }
 
-impl Axis {
+impl GridAxis {
     /// The cell of `x`, ascending with it whatever the rounding; the first or last one outside.
     fn cell(&self, x: f64) -> usize {
         // The cast takes what is negative, or no number, to 0.
@@ -103,34 +103,21 @@ impl Axis {
 
 impl Columns {
     fn new(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Self {
-        let boxes: Vec<[[f64; 2]; 2]> = faces
-            .iter()
-            .map(|face| {
-                [1, 2].map(|k| {
-                    let corners = face.map(|v| positions[v as usize][k]);
-                    [
-                        corners.into_iter().fold(f64::INFINITY, f64::min),
-                        corners.into_iter().fold(f64::NEG_INFINITY, f64::max),
-                    ]
-                })
-            })
-            .collect();
-        let bounds = [0, 1].map(|k| {
-            boxes.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], b| {
-                [low.min(b[k][0]), high.max(b[k][1])]
-            })
-        });
-        let [long, wide] = bounds.map(|[low, high]| (high - low).max(0.0));
+        let boxes: Vec<([f64; 3], [f64; 3])> =
+            faces.iter().map(|face| bounds(face.map(|v| positions[v as usize]))).collect();
+        let (low, high) = bounds(boxes.iter().flat_map(|(low, high)| [*low, *high]));
+        let [long, wide] = [1, 2].map(|k| (high[k] - low[k]).max(0.0));
         let mut cells = CELLS_PER_FACE * faces.len() as f64;
         loop {
             // Square cells where both sides have a length.
             let side = (long * wide / cells).sqrt();
             let count = |length: f64| ((length / side) as usize).clamp(1, cells.max(1.0) as usize);
-            let axis = |[low, high]: [f64; 2], length| Axis { low, high, count: count(length) };
-            let axes = [axis(bounds[0], long), axis(bounds[1], wide)];
-            let ranges = |b: &[[f64; 2]; 2]| [0, 1].map(|k| b[k].map(|x| axes[k].cell(x)));
-            let touched =
-                |b: &[[f64; 2]; 2]| ranges(b).iter().map(|[from, to]| to - from + 1).product::<usize>();
+            let axis = |k: usize, length| GridAxis { low: low[k], high: high[k], count: count(length) };
+            let axes = [axis(1, long), axis(2, wide)];
+            let ranges = |(low, high): &([f64; 3], [f64; 3])| {
+                [0, 1].map(|k| [low, high].map(|corner| axes[k].cell(corner[k + 1])))
+            };
+            let touched = |b: &_| ranges(b).iter().map(|[from, to]| to - from + 1).product::<usize>();
             if cells <= 1.0 || boxes.iter().map(touched).sum::<usize>() <= ENTRIES_PER_FACE * faces.len() {
                 return Self::filled(axes, boxes.iter().map(ranges));
             }
@@ -139,7 +126,7 @@ impl Columns {
     }
 
     /// `ranges`: first and last cell of every face along both axes.
-    fn filled(axes: [Axis; 2], ranges: impl Iterator<Item = [[usize; 2]; 2]> + Clone) -> Self {
+    fn filled(axes: [GridAxis; 2], ranges: impl Iterator<Item = [[usize; 2]; 2]> + Clone) -> Self {
         let cells = |[[low, high], [left, right]]: [[usize; 2]; 2]| {
             (low..=high).flat_map(move |row| (left..=right).map(move |column| row * axes[1].count + column))
         };
