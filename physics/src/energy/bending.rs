@@ -46,15 +46,7 @@ pub struct Bending {
 impl Bending {
     /// Prepares the energy of a garment with rest shape `rest` and its `hinges`; `stiffness` (J/rad²).
     pub fn new(rest: &TriMesh, hinges: &[Hinge], stiffness: f64) -> Self {
-        Self::with_median_edge(rest, hinges, stiffness, rest.median_edge_length())
-    }
-
-    pub(super) fn with_median_edge(
-        rest: &TriMesh,
-        hinges: &[Hinge],
-        stiffness: f64,
-        median_edge: f64,
-    ) -> Self {
+        let median_edge = rest.median_edge_length();
         let floor = COLLAPSE_FLOOR * median_edge * median_edge;
         let collapse = |face: u32| (COLLAPSE_RATIO * 2.0 * rest.face_area(face as usize)).max(floor).powi(2);
         let collapse_squared = hinges.iter().map(|h| h.faces.map(collapse)).collect();

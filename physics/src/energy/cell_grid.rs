@@ -1,7 +1,7 @@
 //! Points sorted into cells, for sums over all pairs within a radius.
 
 use crate::real::Real;
-use crate::vec3::{is_finite, to_f64};
+use crate::vec3::{bounds, is_finite, to_f64};
 
 /// Cells per radius where points are sparse and where they are dense: smaller cells fit the sphere better, and cost more
 /// look-ups and longer lists per point.
@@ -42,10 +42,8 @@ impl<T: Real> CellGrid<T> {
     }
 
     fn with_cells(positions: &[[T; 3]], radius: f64, per_radius: i64) -> Self {
-        let mut low = [f64::INFINITY; 3];
-        for p in positions.iter().filter(|p| is_finite(**p)) {
-            low = std::array::from_fn(|k| low[k].min(p[k].to_f64()));
-        }
+        let finite = positions.iter().filter(|p| is_finite(**p));
+        let (low, _) = bounds(finite.map(|p| to_f64(*p)));
         let per_metre = per_radius as f64 / (radius * (1.0 + SLACK));
         // Beyond 2 million cells along an axis, points share the last cell: slower, still right.
         let last = (1i64 << KEY_BITS) - 1 - 2 * KEY_MARGIN;

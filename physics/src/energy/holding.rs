@@ -29,6 +29,7 @@ pub fn height_rows(transforms: &[Transform]) -> Vec<HeightRow> {
 /// The holding energy of one garment.
 #[derive(Debug, Clone)]
 pub struct Holding {
+    /// Vertices, ascending.
     held: Vec<u32>,
 }
 
@@ -42,11 +43,6 @@ impl Holding {
         held.truncate((fraction * positions.len() as f64 - 1e-9).ceil().max(0.0) as usize);
         held.sort_unstable();
         Self { held }
-    }
-
-    /// The held vertices, ascending.
-    pub fn held(&self) -> &[u32] {
-        &self.held
     }
 
     /// Every held vertex with its height above the reference (m), and how that changes with the position it is read off.
@@ -119,9 +115,9 @@ mod tests {
         let sheet = shapes::grid(0.3, 0.9, 4, 9);
         let holding = Holding::new(&sheet, 0.1);
         // 50 vertices, rows of 5: the top row.
-        assert_eq!(holding.held(), [45, 46, 47, 48, 49]);
-        assert!(Holding::new(&sheet, 0.0).held().is_empty());
-        assert_eq!(Holding::new(&sheet, 1.0).held().len(), 50);
+        assert_eq!(holding.held, [45, 46, 47, 48, 49]);
+        assert!(Holding::new(&sheet, 0.0).held.is_empty());
+        assert_eq!(Holding::new(&sheet, 1.0).held.len(), 50);
         let raised = shapes::mapped(&sheet, |[x, y, z]| [x + 1.0, y + 0.5, z]);
         let settings = EnergySettings::default();
         let energy = holding.evaluate(&state(&sheet, &raised, &sheet, None, &settings), None);

@@ -98,9 +98,7 @@ impl<T: Real> Kernel<T> {
         let mut excess = [T::zero(); LANES];
         let mut product = [T::one(); LANES];
         let mut logarithm = ProductLogarithm::new();
-        let (xs, _) = candidates.x.as_chunks::<LANES>();
-        let (ys, _) = candidates.y.as_chunks::<LANES>();
-        let (zs, _) = candidates.z.as_chunks::<LANES>();
+        let [xs, ys, zs] = candidates.axes.each_ref().map(|axis| axis.as_chunks::<LANES>().0);
         for (step, ((x, y), z)) in xs.iter().zip(ys).zip(zs).enumerate() {
             for lane in 0..LANES {
                 let (dx, dy, dz) = (p[0] - x[lane], p[1] - y[lane], p[2] - z[lane]);
@@ -168,32 +166,26 @@ impl ProductLogarithm {
 /// Coordinates of the vertices around a cell, padded with far points to a multiple of [`LANES`].
 #[derive(Debug, Default)]
 pub(super) struct Candidates<T> {
-    x: Vec<T>,
-    y: Vec<T>,
-    z: Vec<T>,
+    axes: [Vec<T>; 3],
 }
 
 impl<T: Real> Candidates<T> {
     pub fn clear(&mut self) {
-        self.x.clear();
-        self.y.clear();
-        self.z.clear();
+        self.axes.iter_mut().for_each(Vec::clear);
     }
 
     /// Appends the points `range` of lists of coordinates.
-    pub fn extend(&mut self, [x, y, z]: &[Vec<T>; 3], range: Range<usize>) {
-        self.x.extend_from_slice(&x[range.clone()]);
-        self.y.extend_from_slice(&y[range.clone()]);
-        self.z.extend_from_slice(&z[range]);
+    pub fn extend(&mut self, axes: &[Vec<T>; 3], range: Range<usize>) {
+        for (to, from) in self.axes.iter_mut().zip(axes) {
+            to.extend_from_slice(&from[range.clone()]);
+        }
     }
 
     pub fn pad(&mut self) {
         // Finite, so that its offset times a zero weight is zero; its square is infinite or nearly so, hence outside.
         let far = T::max_value().sqrt();
-        let padded = self.x.len().next_multiple_of(LANES);
-        self.x.resize(padded, far);
-        self.y.resize(padded, far);
-        self.z.resize(padded, far);
+        let padded = self.axes[0].len().next_multiple_of(LANES);
+        self.axes.iter_mut().for_each(|axis| axis.resize(padded, far));
     }
 }
 

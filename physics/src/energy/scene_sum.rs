@@ -32,13 +32,9 @@ pub fn weighted(weights: &TermMap<f64>, raw: &TermMap<Option<f64>>) -> f64 {
     terms.filter_map(|(term, value)| value.map(|v| weights[term] * v)).sum()
 }
 
-/// Which terms a run evaluates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Selection {
-    /// Those with a weight.
-    Weighted,
-    /// All that there is input for.
-    All,
+/// Whether a term of this weight counts.
+pub(super) fn is_weighted(weight: f64) -> bool {
+    weight != 0.0
 }
 
 /// What several terms share of a garment at its present positions.
@@ -90,7 +86,7 @@ impl<T: Real> SceneEnergy<T> {
     /// If a length is not that of the scene, or a scene does not pass [`check`](Self::check): these are errors of the
     /// calling code, not of its input.
     pub fn evaluate(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
-        self.run(posed, canonical, Selection::Weighted, true, None)
+        self.run(posed, canonical, is_weighted, true, None)
     }
 
     /// The same, for positions that are near those of earlier calls with the same `memory`.
@@ -98,7 +94,7 @@ impl<T: Real> SceneEnergy<T> {
     /// # Panics
     /// As [`evaluate`](Self::evaluate).
     pub(crate) fn evaluate_near(&self, posed: &[[T; 3]], memory: &mut BodyMemory) -> SceneValue<T> {
-        self.run(posed, &[], Selection::Weighted, true, Some(memory))
+        self.run(posed, &[], is_weighted, true, Some(memory))
     }
 
     /// The same value, without gradients.
@@ -106,7 +102,7 @@ impl<T: Real> SceneEnergy<T> {
     /// # Panics
     /// As [`evaluate`](Self::evaluate).
     pub fn value(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
-        self.run(posed, canonical, Selection::Weighted, false, None)
+        self.run(posed, canonical, is_weighted, false, None)
     }
 
     /// All raw values, whatever the weights, without gradients: what a score reports. A garment that is not held has no
@@ -115,36 +111,32 @@ impl<T: Real> SceneEnergy<T> {
     /// # Panics
     /// As [`evaluate`](Self::evaluate).
     pub fn raw(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
-        self.run(posed, canonical, Selection::All, false, None)
+        self.run(posed, canonical, |_| true, false, None)
     }
 
+    /// Evaluates the terms with weights that are active, as far as there is input for them.
     fn run(
         &self,
         posed: &[[T; 3]],
         canonical: &[[T; 3]],
-        selection: Selection,
+        is_active: fn(f64) -> bool,
         with_gradient: bool,
         memory: Option<&mut BodyMemory>,
     ) -> SceneValue<T> {
         let count = self.vertex_count();
         assert_eq!(posed.len(), count, "posed positions of all garments of the scene");
         assert!(
-            canonical.len() == count
-                || canonical.is_empty() && (selection == Selection::All || !self.needs_canonical()),
+            canonical.len() == count || canonical.is_empty() && (is_active(0.0) || !self.needs_canonical()),
             "{} canonical positions for the {count} vertices of the scene",
             canonical.len()
         );
-        let is_active = |_: Term, weight: f64| match selection {
-            Selection::Weighted => weight != 0.0,
-            Selection::All => true,
-        };
         let shared: Vec<Shared<'_, T>> = self
             .ranges()
             .into_par_iter()
             .zip(memories(memory, self.garments.len()))
             .enumerate()
             .map(|(i, (range, near))| {
-                self.share(i, &posed[range.clone()], canonical.get(range).unwrap_or(&[]), &is_active, near)
+                self.share(i, &posed[range.clone()], canonical.get(range).unwrap_or(&[]), is_active, near)
             })
             .collect();
 
@@ -162,7 +154,7 @@ impl<T: Real> SceneEnergy<T> {
                 for (term, energy) in garment.energies.terms() {
                     let weight = garment.weights[term];
                     let is_canonical = garment.is_canonical(term);
-                    if !is_active(term, weight) || is_canonical && canonical.is_empty() {
+                    if !is_active(weight) || is_canonical && canonical.is_empty() {
                         continue;
                     }
                     let space = if is_canonical { &mut canonical_gradient } else { &mut posed_gradient };
@@ -174,7 +166,7 @@ impl<T: Real> SceneEnergy<T> {
             .collect();
 
         let pairs: Vec<PairValue<T>> =
-            self.layers.par_iter().map(|pair| self.pair(pair, &shared, &is_active, with_gradient)).collect();
+            self.layers.par_iter().map(|pair| self.pair(pair, &shared, is_active, with_gradient)).collect();
         if with_gradient {
             let ranges = self.ranges();
             for (pair, value) in self.layers.iter().zip(&pairs) {
@@ -216,16 +208,16 @@ impl<T: Real> SceneEnergy<T> {
         i: usize,
         posed: &'a [[T; 3]],
         canonical: &'a [[T; 3]],
-        is_active: &(impl Fn(Term, f64) -> bool + Sync),
+        is_active: fn(f64) -> bool,
         near: Option<&mut Vec<NearFaces>>,
     ) -> Shared<'a, T> {
         let garment = &self.garments[i];
         let in_pair = |term: Term, is_side: fn(&SceneLayers, usize) -> bool| {
-            self.layers.iter().any(|pair| is_side(pair, i) && is_active(term, pair.weights[term]))
+            self.layers.iter().any(|pair| is_side(pair, i) && is_active(pair.weights[term]))
         };
         let in_distance = in_pair(Term::LayerDistance, |pair, i| pair.inner == i || pair.outer == i);
         let is_inner = in_pair(Term::LayerCollision, |pair, i| pair.inner == i);
-        let needs_gaps = in_distance || is_active(Term::BodyCollision, garment.weights[Term::BodyCollision]);
+        let needs_gaps = in_distance || is_active(garment.weights[Term::BodyCollision]);
 
         let gaps = match needs_gaps {
             true => self.gaps(i, posed, in_distance, near),
@@ -283,7 +275,7 @@ impl<T: Real> SceneEnergy<T> {
         &self,
         pair: &SceneLayers,
         shared: &[Shared<'_, T>],
-        is_active: &(impl Fn(Term, f64) -> bool + Sync),
+        is_active: fn(f64) -> bool,
         with_gradient: bool,
     ) -> PairValue<T> {
         let (inner, outer) = (&shared[pair.inner], &shared[pair.outer]);
@@ -291,7 +283,7 @@ impl<T: Real> SceneEnergy<T> {
         let mut gradients = with_gradient.then(|| [zeros(inner), zeros(outer)]);
         let mut raw = TermMap::default();
         for (term, &weight) in pair.weights.iter() {
-            if !term.is_layer_term() || !is_active(term, weight) {
+            if !term.is_layer_term() || !is_active(weight) {
                 continue;
             }
             let targets = gradients

@@ -35,15 +35,15 @@ const NO_HEIGHT: f64 = 1e-12;
 /// it, which the contact's leaves out. All of it made the steps of the static solver five to ten times too short in the
 /// end, none of it makes them too long at first (iterations to within 1 mJ of the minimum from skinning, median of 13
 /// scenes: 29 with 1, 15 with 0.3, more than 40 with 0).
-pub const TENSION_SHARE: f64 = 0.3;
+const TENSION_SHARE: f64 = 0.3;
 
 /// Which rest triangles are too flat to be measured as they are.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Needle {
+struct Needle {
     /// Least ratio of height to longest edge.
-    pub ratio: f64,
+    ratio: f64,
     /// Of the whole garment (m).
-    pub median_edge: f64,
+    median_edge: f64,
 }
 
 /// A rest triangle in a frame whose first axis is its longest edge, corner 0 → corner 1.
@@ -167,11 +167,7 @@ impl RestTriangle {
 impl Strain {
     /// For a garment with rest shape `rest`; `needle_ratio` as in [`EnergySettings`](super::EnergySettings::needle_ratio).
     pub fn new(rest: &TriMesh, material: &Material, needle_ratio: f64) -> Self {
-        let median_edge = rest.median_edge_length();
-        Self::with_needle(rest, material, Needle { ratio: needle_ratio, median_edge })
-    }
-
-    pub(super) fn with_needle(rest: &TriMesh, material: &Material, needle: Needle) -> Self {
+        let needle = Needle { ratio: needle_ratio, median_edge: rest.median_edge_length() };
         let triangles: Vec<RestTriangle> = rest
             .faces()
             .iter()

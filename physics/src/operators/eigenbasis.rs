@@ -2,8 +2,10 @@
 
 use faer::Mat;
 
+use crate::mesh::DisjointSets;
 use crate::operators::lanczos::{Failure, dense_eigenpairs, smallest_eigenpairs};
 use crate::operators::{OperatorError, SparseMatrix};
+use crate::rows::CompressedRows;
 
 /// The smallest mass in the eigenvalue problem, relative to the mean mass of the component.
 const MASS_FLOOR: f64 = 1e-6;
@@ -75,28 +77,15 @@ pub fn eigenbasis(laplacian: &SparseMatrix, mass: &[f64], count: usize) -> Resul
 /// Not those of the faces: a face collapsed to a point has no entries, and a vertex with only such faces hangs on nothing.
 fn members(laplacian: &SparseMatrix, mass: &[f64]) -> Vec<Vec<u32>> {
     let smallest_area = AREA_FLOOR * mass.iter().sum::<f64>();
-    let mut seen = vec![false; mass.len()];
-    let mut components = Vec::new();
-    for seed in 0..mass.len() {
-        if std::mem::replace(&mut seen[seed], true) {
-            continue;
-        }
-        let mut vertices = vec![seed as u32];
-        let mut next = 0;
-        while next < vertices.len() {
-            for &neighbour in laplacian.row(vertices[next] as usize).0 {
-                if !std::mem::replace(&mut seen[neighbour as usize], true) {
-                    vertices.push(neighbour);
-                }
-            }
-            next += 1;
-        }
-        if vertices.iter().map(|&v| mass[v as usize]).sum::<f64>() > smallest_area {
-            vertices.sort_unstable();
-            components.push(vertices);
-        }
+    let mut sets = DisjointSets::new(mass.len());
+    for vertex in 0..mass.len() {
+        laplacian.row(vertex).0.iter().for_each(|&neighbour| sets.join(vertex as u32, neighbour));
     }
-    components
+    let rooted: Vec<(usize, u32)> = (0..mass.len() as u32).map(|v| (sets.root(v) as usize, v)).collect();
+    let components = CompressedRows::grouped(mass.len(), rooted.into_iter());
+    let area = |vertices: &[u32]| vertices.iter().map(|&v| mass[v as usize]).sum::<f64>();
+    let all = (0..mass.len()).map(|lowest| components.row(lowest));
+    all.filter(|vertices| area(vertices) > smallest_area).map(<[u32]>::to_vec).collect()
 }
 
 /// Eigenvalues ascending and eigenvectors by column on one component.

@@ -7,7 +7,6 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::linalg::matmul::matmul;
-use faer::prelude::IntoConst;
 use faer::{Accum, Col, Mat, MatRef, Par};
 
 use crate::mesh::shapes::SplitMix;
@@ -67,8 +66,8 @@ pub(super) fn smallest_eigenpairs(
     let mut residual = f64::INFINITY;
     for _ in 0..SHIFT_LIMIT {
         match with_shift(matrix, kernel, count, shift)? {
-            Outcome::Converged(vectors) => return Ok(rayleigh_quotients(matrix, vectors)),
-            Outcome::Stalled { largest_residual, last_eigenvalue } => {
+            LanczosOutcome::Converged(vectors) => return Ok(rayleigh_quotients(matrix, vectors)),
+            LanczosOutcome::Stalled { largest_residual, last_eigenvalue } => {
                 residual = largest_residual;
                 // A shift far above the wanted eigenvalues blurs them into one, one far below drowns them in rounding.
                 shift = if last_eigenvalue > 1e-6 * shift { last_eigenvalue / 8.0 } else { 1e-3 * shift };
@@ -78,7 +77,7 @@ pub(super) fn smallest_eigenpairs(
     Err(Failure::NotConverged(residual))
 }
 
-enum Outcome {
+enum LanczosOutcome {
     Converged(Mat<f64>),
     /// The restarts were used up; `last_eigenvalue` estimates the largest wanted one.
     Stalled {
@@ -87,7 +86,12 @@ enum Outcome {
     },
 }
 
-fn with_shift(matrix: &SparseMatrix, kernel: &[f64], count: usize, shift: f64) -> Result<Outcome, Failure> {
+fn with_shift(
+    matrix: &SparseMatrix,
+    kernel: &[f64],
+    count: usize,
+    shift: f64,
+) -> Result<LanczosOutcome, Failure> {
     let n = matrix.rows();
     let factor =
         Cholesky::new(&shifted(matrix, shift)).ok_or(Failure::Factorisation("the sparse factorisation"))?;
@@ -107,11 +111,11 @@ fn with_shift(matrix: &SparseMatrix, kernel: &[f64], count: usize, shift: f64) -
         next_check = space.filled + between_checks;
         let ritz = space.ritz(&rest.coupling, count).ok_or(Failure::Factorisation("Rayleigh–Ritz"))?;
         if ritz.largest_residual <= TOLERANCE {
-            return Ok(Outcome::Converged(space.refined(&ritz, &rest, count)));
+            return Ok(LanczosOutcome::Converged(space.refined(&ritz, &rest, count)));
         }
         if full {
             if restarts == RESTART_LIMIT {
-                return Ok(Outcome::Stalled {
+                return Ok(LanczosOutcome::Stalled {
                     largest_residual: ritz.largest_residual,
                     last_eigenvalue: 1.0 / ritz.values[count - 1].max(f64::MIN_POSITIVE) - shift,
                 });
@@ -197,12 +201,7 @@ impl Krylov {
             space.basis[(i, 0)] = kernel[i];
         }
         space.projected[(0, 0)] = kernel_value;
-        let mut block = Mat::from_fn(n, BLOCK, |_, _| 0.0);
-        for j in 0..BLOCK {
-            for i in 0..n {
-                block[(i, j)] = space.random.symmetric();
-            }
-        }
+        let mut block = Mat::from_fn(n, BLOCK, |_, _| space.random.symmetric());
         operator(block.as_mut());
         space.project_out(&mut block);
         let start = space.orthonormalise(block);
@@ -253,31 +252,17 @@ impl Krylov {
         let mut coupling = Mat::<f64>::zeros(BLOCK, BLOCK);
         for j in 0..BLOCK {
             let before = norm(&block, j);
-            for _ in 0..2 {
-                for i in 0..j {
-                    let overlap: f64 = dot(&block, i, j);
-                    coupling[(i, j)] += overlap;
-                    subtract(&mut block, i, j, overlap);
-                }
-            }
+            part_from_earlier(&mut block, j, |i, overlap| coupling[(i, j)] += overlap);
             let after = norm(&block, j);
             // What is left after cancelling twelve digits is rounding, not a direction.
             if after > 1e-12 * before && after > 1e-150 {
                 coupling[(j, j)] = after;
                 divide(&mut block, j, after);
             } else {
-                let mut fresh = Mat::<f64>::zeros(n, 1);
-                for i in 0..n {
-                    fresh[(i, 0)] = self.random.symmetric();
-                }
+                let mut fresh = Mat::from_fn(n, 1, |_, _| self.random.symmetric());
                 self.project_out(&mut fresh);
                 block.as_mut().col_mut(j).copy_from(fresh.col(0));
-                for _ in 0..2 {
-                    for i in 0..j {
-                        let overlap = dot(&block, i, j);
-                        subtract(&mut block, i, j, overlap);
-                    }
-                }
+                part_from_earlier(&mut block, j, |_, _| ());
                 let length = norm(&block, j).max(f64::MIN_POSITIVE);
                 divide(&mut block, j, length);
             }
@@ -344,29 +329,21 @@ impl Krylov {
     }
 }
 
-fn column(matrix: &Mat<f64>, j: usize) -> &[f64] {
-    matrix.col_as_slice(j)
-}
-
 fn norm(matrix: &Mat<f64>, j: usize) -> f64 {
-    column(matrix, j).iter().map(|v| v * v).sum::<f64>().sqrt()
+    matrix.col_as_slice(j).iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
-fn dot(matrix: &Mat<f64>, i: usize, j: usize) -> f64 {
-    column(matrix, i).iter().zip(column(matrix, j)).map(|(a, b)| a * b).sum()
-}
-
-fn subtract(matrix: &mut Mat<f64>, i: usize, j: usize, factor: f64) {
-    let (from, mut to) = two_columns(matrix, i, j);
-    for row in 0..from.nrows() {
-        to[row] -= factor * from[row];
+/// Makes column `j` orthogonal to the earlier ones, twice, and reports how much of each was in it.
+fn part_from_earlier(block: &mut Mat<f64>, j: usize, mut removed: impl FnMut(usize, f64)) {
+    for _ in 0..2 {
+        for i in 0..j {
+            let earlier = block.col_as_slice(i).to_vec();
+            let column = block.col_as_slice_mut(j);
+            let overlap: f64 = earlier.iter().zip(&*column).map(|(a, b)| a * b).sum();
+            removed(i, overlap);
+            column.iter_mut().zip(&earlier).for_each(|(value, other)| *value -= overlap * other);
+        }
     }
-}
-
-fn two_columns(matrix: &mut Mat<f64>, i: usize, j: usize) -> (faer::ColRef<'_, f64>, faer::ColMut<'_, f64>) {
-    debug_assert!(i < j);
-    let (left, right) = matrix.as_mut().split_at_col_mut(j);
-    (left.into_const().col(i), right.col_mut(0))
 }
 
 fn divide(matrix: &mut Mat<f64>, j: usize, divisor: f64) {

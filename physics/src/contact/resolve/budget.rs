@@ -70,14 +70,14 @@ impl Budget {
         self.spent() >= self.rounds.get() - self.rounds.get() / LAST || self.is_late()
     }
 
-    /// Counts the time since `start` as that to prepare a body.
-    pub fn count_body(&self, start: Instant) {
-        self.body_time.set(self.body_time() + start.elapsed());
+    /// What `prepare` returns; its time counts as that to prepare a body.
+    pub fn preparing<R>(&self, prepare: impl FnOnce() -> R) -> R {
+        timed(&self.body_time, prepare)
     }
 
-    /// Counts the time since `start` as that for a certificate.
-    pub fn count_certificate(&self, start: Instant) {
-        self.certificate_time.set(self.certificate_time() + start.elapsed());
+    /// What `certify` returns; its time counts as that for a certificate.
+    pub fn certifying<R>(&self, certify: impl FnOnce() -> R) -> R {
+        timed(&self.certificate_time, certify)
     }
 
     /// Time to prepare bodies.
@@ -94,6 +94,14 @@ impl Budget {
     pub fn elapsed(&self) -> Duration {
         self.start.elapsed()
     }
+}
+
+/// What `run` returns; its time is added to `total`.
+fn timed<R>(total: &Cell<Duration>, run: impl FnOnce() -> R) -> R {
+    let start = Instant::now();
+    let done = run();
+    total.set(total.get() + start.elapsed());
+    done
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use super::contact::{along_line, normal_of};
 use super::obstacle::{BodyObstacle, touching};
 use crate::contact::{Triangle, TriangleTree};
 use crate::query::{FaceSide, Surface};
-use crate::vec3::{add_scaled, dot};
+use crate::vec3::{add_scaled, bounds, dot};
 
 /// Distance that two facing parts of the body keep (m), for straight triangles around a limb…
 const CLEARANCE: f64 = 0.006;
@@ -72,6 +72,11 @@ pub(super) struct YieldedBody {
 }
 
 impl YieldedBody {
+    /// Of the body `drawn` near `garments` garments, wherever two surfaces face each other.
+    pub fn ample(drawn: &BodyObstacle<'_>, garments: usize) -> Option<Self> {
+        Self::of(drawn, garments, Clearance::AMPLE, None)
+    }
+
     /// Of the given body `drawn`, near `garments` garments. `None` if nothing has to yield, or the surface is not closed and has
     /// no inside.
     pub fn of(
@@ -101,8 +106,9 @@ impl YieldedBody {
 
 impl<'a> BodyObstacle<'a> {
     /// The body after yielding. Where it meets itself only because of that, it counts as it was.
-    pub fn yielded_obstacle(yielded: &'a YieldedBody, near: &'a [bool]) -> Self {
-        let mut obstacle = Self::pinched_where(&yielded.surface, near, |v| yielded.pinched[v as usize]);
+    pub fn yielded_obstacle(yielded: &'a YieldedBody, near: &[bool]) -> Self {
+        let is_pinched = |v: u32| yielded.pinched[v as usize];
+        let mut obstacle = Self::pinched_where(&yielded.surface, near.to_vec(), is_pinched);
         obstacle.yields(yielded);
         obstacle
     }
@@ -160,9 +166,6 @@ fn facing_surface(
     p: [f64; 3],
     n: [f64; 3],
 ) -> Option<f64> {
-    let end = add_scaled(p, reach, n);
-    let low = std::array::from_fn(|k| p[k].min(end[k]));
-    let high = std::array::from_fn(|k| p[k].max(end[k]));
     let faces_it = |f: u32| {
         if faces[f as usize].contains(&v) {
             return None;
@@ -172,7 +175,8 @@ fn facing_surface(
         let is_in_reach = along * reach.signum() > 0.0 && along.abs() <= reach.abs();
         (is_in_reach && dot(normal_of(&triangle), n) < FACING).then_some(along)
     };
-    tree.faces_in_box(low, high).filter_map(faces_it).min_by(|a, b| a.abs().total_cmp(&b.abs()))
+    let along = tree.faces_in_box(bounds([p, add_scaled(p, reach, n)]));
+    along.filter_map(faces_it).min_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
 /// How far from vertex `v` at `p`, inside another part, the nearest surface is that does not face the way of `n`: for a vertex
@@ -205,7 +209,7 @@ mod tests {
     fn yielded_obstacle(apart: f64, garments: usize) -> (Surface<f64>, Option<YieldedBody>) {
         let body = Surface::from_mesh(&balls(apart));
         let near = vec![true; body.positions.len()];
-        let yielded = YieldedBody::of(&BodyObstacle::new(&body, &near), garments, Clearance::AMPLE, None);
+        let yielded = YieldedBody::of(&BodyObstacle::new(&body, near), garments, Clearance::AMPLE, None);
         (body, yielded)
     }
 
@@ -242,7 +246,7 @@ mod tests {
     fn the_yield_is_limited_per_step_and_scales_with_the_share() {
         let body = Surface::from_mesh(&balls(0.19));
         let near = vec![true; body.positions.len()];
-        let drawn = BodyObstacle::new(&body, &near);
+        let drawn = BodyObstacle::new(&body, near);
         let all = YieldedBody::of(&drawn, 1, Clearance::AMPLE, None).unwrap();
         let (steps, most) = (vec![0.0; body.positions.len()], 0.002);
         let slow =
@@ -269,7 +273,7 @@ mod tests {
         let steps = |apart: f64| {
             let body = Surface::from_mesh(&balls(apart));
             let near = vec![true; body.positions.len()];
-            YieldedBody::of(&BodyObstacle::new(&body, &near), 1, Clearance::DEEP, None).unwrap().steps
+            YieldedBody::of(&BodyObstacle::new(&body, near), 1, Clearance::DEEP, None).unwrap().steps
         };
         for apart in [0.199, 0.19, 0.17, 0.15] {
             // Nowhere farther than half of what overlaps along the line of the centres.
@@ -286,14 +290,14 @@ mod tests {
         assert!(yielded_obstacle(0.25, 1).1.is_none());
         let open = Surface::from_mesh(&shapes::grid(0.1, 0.1, 4, 4));
         let near = vec![true; open.positions.len()];
-        assert!(YieldedBody::of(&BodyObstacle::new(&open, &near), 1, Clearance::AMPLE, None).is_none());
+        assert!(YieldedBody::of(&BodyObstacle::new(&open, near), 1, Clearance::AMPLE, None).is_none());
         let body = Surface::from_mesh(&balls(0.19));
         let far = vec![false; body.positions.len()];
-        assert!(YieldedBody::of(&BodyObstacle::new(&body, &far), 1, Clearance::AMPLE, None).is_none());
+        assert!(YieldedBody::of(&BodyObstacle::new(&body, far), 1, Clearance::AMPLE, None).is_none());
         // Near each other, but not inside.
         let body = Surface::from_mesh(&balls(0.203));
         let near = vec![true; body.positions.len()];
-        let drawn = BodyObstacle::new(&body, &near);
+        let drawn = BodyObstacle::new(&body, near);
         assert!(YieldedBody::of(&drawn, 1, Clearance::AMPLE, None).is_some());
         assert!(YieldedBody::of(&drawn, 1, Clearance::AMPLE.with_share(0.0), None).is_none());
     }

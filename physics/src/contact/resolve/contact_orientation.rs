@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::contact::{Contact, is_tiny, normal_of};
 use super::outfit::Outfit;
 use crate::contact::TriangleTree;
-use crate::vec3::{cross, dot, norm_squared, scale, sub};
+use crate::vec3::{bounds, cross, dot, norm_squared, scale, sub};
 
 /// Elements nearer than this (m) may meet in a step.
 const WATCH: f64 = 0.006;
@@ -145,7 +145,10 @@ impl ContactOrientation {
             }
             let Some(Past { at, normal, height }) = past(positions, *edges) else { continue };
             if height * side < 2.0 * most {
-                found.push(Contact::edges(*edges, at, scale(normal, *side), gap.clamp(least, most)));
+                let ([[p, q], [r, s]], [t, u]) = (*edges, at);
+                let weights = [1.0 - t, t, u - 1.0, -u];
+                let target = gap.clamp(least, most);
+                found.push(Contact::new([p, q, r, s], weights, scale(normal, *side), target));
             }
         }
     }
@@ -215,9 +218,8 @@ impl Pairs {
 
 /// Faces with a box near that of two points.
 fn faces_near<'a>(tree: &'a TriangleTree<'_>, [a, b]: [[f64; 3]; 2]) -> impl Iterator<Item = u32> + 'a {
-    let low = std::array::from_fn(|k| a[k].min(b[k]) - WATCH);
-    let high = std::array::from_fn(|k| a[k].max(b[k]) + WATCH);
-    tree.faces_in_box(low, high)
+    let (low, high) = bounds([a, b]);
+    tree.faces_in_box((low.map(|x| x - WATCH), high.map(|x| x + WATCH)))
 }
 
 /// Whether an edge joins one of `some` to one of `others`: neighbours in one sheet have no orientation.

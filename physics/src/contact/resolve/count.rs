@@ -1,7 +1,8 @@
 //! Counts the certificate from nothing: all pairs of triangles, and the depth of every vertex.
 
-use super::body::{with_body, with_drawn};
+use super::body::Body;
 use super::certificate::Certificate;
+use super::clearance::YieldedBody;
 use super::garment::{at, check};
 use super::near::MARGIN;
 use super::obstacle::BodyObstacle;
@@ -24,13 +25,13 @@ pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate,
 
 /// [`certify`] for valid arguments.
 pub(super) fn certified_around(body: &Surface<f64>, layers: &[Layer<'_>]) -> Certificate {
-    with_drawn(body, layers, |drawn| {
-        let mut found = certificate(&drawn, layers);
-        if found.body_triangle_pairs > 0 {
-            with_body(drawn, layers.len(), |body| found.count_narrow(&body.drawn));
-        }
-        found
-    })
+    let drawn = BodyObstacle::near_layers(body, layers);
+    let mut found = certificate(&drawn, layers);
+    if found.body_triangle_pairs > 0 {
+        let yielded = YieldedBody::ample(&drawn, layers.len());
+        found.count_narrow(&Body::new(drawn, layers.len(), yielded.as_ref()).drawn);
+    }
+    found
 }
 
 /// [`certified_around`] near a `body` that is prepared; its yield is as it was noted.

@@ -152,7 +152,7 @@ mod tests {
             garments.iter().zip(&places).map(|(garment, positions)| Layer { garment, positions }).collect();
         let outfit = Outfit::new(&layers);
         let near = vec![true; ball.positions.len()];
-        let body = BodyObstacle::new(&ball, &near);
+        let body = BodyObstacle::new(&ball, near);
         let mut positions = places.concat();
         let mut kept = IntersectingPairs::new(outfit.faces.len());
         let mut counts = [0; 3];

@@ -1,7 +1,7 @@
 //! A garment as the post-process sees it: what its positions do not change, and where it is.
 
 use super::ResolveError;
-use crate::contact::LayerTopology;
+use crate::contact::{LayerTopology, Triangle};
 use crate::energy::{EnergySettings, Material, strain::Strain};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::Surface;
@@ -91,9 +91,10 @@ pub(super) fn at<'a>(layers: &[Layer<'a>], positions: &'a [Vec<[f64; 3]>]) -> Ve
     layers.iter().zip(positions).map(|(l, positions)| Layer { garment: l.garment, positions }).collect()
 }
 
-/// Positions and faces of every garment.
-pub(super) fn triangles<'a>(layers: &[Layer<'a>]) -> Vec<(&'a [[f64; 3]], &'a [[u32; 3]])> {
-    layers.iter().map(|l| (l.positions, l.garment.faces.as_slice())).collect()
+/// Corners of all faces of the garments.
+pub(super) fn triangles(layers: &[Layer<'_>]) -> Vec<Triangle> {
+    let corners = |l: &Layer<'_>, face: &[u32; 3]| face.map(|v| l.positions[v as usize]);
+    layers.iter().flat_map(|l| l.garment.faces.iter().map(move |face| corners(l, face))).collect()
 }
 
 /// Whether the input can be worked on.

@@ -12,7 +12,7 @@ use super::contact::{Contact, along_line, is_tiny, normal_of, overlap};
 use super::outfit::Outfit;
 use crate::contact::{Triangle, TriangleTree};
 use crate::mesh::vertex_normals;
-use crate::vec3::{add, add_scaled, dot, neg, norm, normalized, scale, sub};
+use crate::vec3::{add, add_scaled, bounds, dot, neg, norm, normalized, scale, sub};
 
 /// A sheet whose outward direction differs more than this from the vertex's (cosine) lies over another part of
 /// the body: a sleeve is not over the side of the chest.
@@ -22,7 +22,7 @@ const SAME_PART: f64 = 0.5;
 pub(super) const STEEP: f64 = 0.5;
 
 /// Two sheets look at each other where their directions away from the body have a cosine below this.
-const FACING: f64 = -0.3;
+const FACING_SHEETS: f64 = -0.3;
 /// Rings over which directions are smoothed.
 const SMOOTHED_RINGS: usize = 4;
 
@@ -79,12 +79,10 @@ fn look(
     if away == [0.0; 3] {
         return None;
     }
-    let (from, to) = (add_scaled(p, -watch, away), add_scaled(p, reach, away));
-    let low = std::array::from_fn(|k| from[k].min(to[k]));
-    let high = std::array::from_fn(|k| from[k].max(to[k]));
+    let along = bounds([add_scaled(p, -watch, away), add_scaled(p, reach, away)]);
     let first = outfit.faces_of_garment(inner).start;
     let mut outermost = OutermostSheet { from: p, away, heights: -watch..=reach, found: None };
-    for f in tree.faces_in_box(low, high) {
+    for f in tree.faces_in_box(along) {
         outermost.offer(first + f, outfit.faces[(first + f) as usize], positions, outward);
     }
     outermost.over(vertex, outfit, positions)
@@ -105,7 +103,7 @@ pub(super) struct OutermostSheet {
 impl OutermostSheet {
     /// Looks at face number `f`, unless it lies over another part of the body.
     pub fn offer(&mut self, f: u32, face: [u32; 3], positions: &[[f64; 3]], outward: &[[f64; 3]]) {
-        let sheet = face.iter().fold([0.0; 3], |sum, &v| add(sum, outward[v as usize]));
+        let sheet = sum_over(face, outward);
         if dot(sheet, self.away) < SAME_PART * norm(sheet) {
             return;
         }
@@ -137,27 +135,28 @@ fn sheet_normal(sheet: &Triangle, away: [f64; 3]) -> [f64; 3] {
     }
 }
 
-/// How two intersecting triangles have to lie, by their directions away from the body.
-pub(super) enum Order {
-    /// The first over the second, along this direction.
-    Along([f64; 3]),
-    /// Nothing says so.
-    Unknown,
+/// The direction along which the first of two triangles has to lie over the second, by their directions away from the body; none
+/// where nothing says so. Where they look at each other (a sleeve and the side of the chest) each has to stay on its own part's
+/// side, whichever garments they belong to; otherwise the outer garment lies over the inner one, and two folds of one garment have
+/// no order.
+pub(super) fn order(
+    first: [u32; 3],
+    second: [u32; 3],
+    is_outer: bool,
+    outward: &[[f64; 3]],
+) -> Option<[f64; 3]> {
+    let [a, b] = [first, second].map(|face| normalized(sum_over(face, outward)));
+    match dot(a, b) {
+        _ if a == [0.0; 3] || b == [0.0; 3] => None,
+        c if c < FACING_SHEETS => Some(normalized(sub(b, a))),
+        _ if is_outer => Some(normalized(add(a, b))),
+        _ => None,
+    }
 }
 
-/// The order of two triangles that intersect. Where they look at each other (a sleeve and the side of the chest) each has to stay
-/// on its own part's side, whichever garments they belong to; otherwise the outer garment lies over the inner one, and two
-/// folds of one garment have no order.
-pub(super) fn order(first: [u32; 3], second: [u32; 3], is_outer: bool, outward: &[[f64; 3]]) -> Order {
-    let mean =
-        |face: [u32; 3]| normalized(face.iter().fold([0.0; 3], |sum, &v| add(sum, outward[v as usize])));
-    let (a, b) = (mean(first), mean(second));
-    match dot(a, b) {
-        _ if a == [0.0; 3] || b == [0.0; 3] => Order::Unknown,
-        c if c < FACING => Order::Along(normalized(sub(b, a))),
-        _ if is_outer => Order::Along(normalized(add(a, b))),
-        _ => Order::Unknown,
-    }
+/// The sum of what the corners of a face have.
+pub(super) fn sum_over(face: [u32; 3], values: &[[f64; 3]]) -> [f64; 3] {
+    face.iter().fold([0.0; 3], |sum, &v| add(sum, values[v as usize]))
 }
 
 /// Conditions for two intersecting triangles: the first has to lie `gap` over the second along `away`, as far as they cover each
@@ -204,7 +203,7 @@ pub(super) fn part_from_body(
     let level = dot(normal, ground[0]);
     for corner in overlap(&upper, ground, normal).iter().filter(|corner| corner.height < gap) {
         let target = level + gap.min(corner.height + longest_step);
-        found.push(Contact::face_point(face, corner.at_upper, normal, target));
+        found.push(Contact::new(face, corner.at_upper, normal, target));
     }
 }
 

@@ -1,7 +1,8 @@
 //! Broad phase: the part of the body that clothes can meet. Ten fingers are half of the body's triangles and far from a tight
 //! top.
 
-use crate::vec3::is_finite;
+use crate::contact::Triangle;
+use crate::vec3::{bounds, is_finite};
 use std::ops::Range;
 
 /// Cells in which cloth is looked for (m).
@@ -14,20 +15,12 @@ const MOST_CELLS: f64 = 1e6;
 /// Cloth that moves no farther than this (m) meets only faces that are near; a little less than all, for rounding.
 pub(super) const MARGIN: f64 = REACH as f64 * CELL * (1.0 - 1e-9);
 
-/// Which vertices of a surface belong to a face near a triangle of the cloth, given as positions and faces of each garment;
-/// all where none does. Faces count, however large: none that comes closer than [`MARGIN`] is left out.
-pub(super) fn near_cloth(
-    points: &[[f64; 3]],
-    surface: &[[u32; 3]],
-    cloth: &[(&[[f64; 3]], &[[u32; 3]])],
-) -> Vec<bool> {
+/// Which vertices of a surface belong to a face near a triangle of the `cloth`; all where none does. Faces count, however large:
+/// none that comes closer than [`MARGIN`] is left out.
+pub(super) fn near_cloth(points: &[[f64; 3]], surface: &[[u32; 3]], cloth: &[Triangle]) -> Vec<bool> {
     let all = || vec![true; points.len()];
     let Some(mut cells) = Cells::around(cloth) else { return all() };
-    for (positions, faces) in cloth {
-        for face in *faces {
-            cells.fill(face.map(|v| positions[v as usize]));
-        }
-    }
+    cloth.iter().for_each(|triangle| cells.fill(*triangle));
     cells.spread();
     let mut near = vec![false; points.len()];
     for face in surface {
@@ -50,17 +43,12 @@ struct Cells {
 impl Cells {
     /// Those around all corners of the cloth, with room to spread; `None` for more than [`MOST_CELLS`], or corners that are no
     /// numbers.
-    fn around(cloth: &[(&[[f64; 3]], &[[u32; 3]])]) -> Option<Self> {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for (positions, faces) in cloth {
-            for p in faces.as_flattened().iter().map(|&v| positions[v as usize]) {
-                if !is_finite(p) {
-                    return None;
-                }
-                low = std::array::from_fn(|k| low[k].min(p[k]));
-                high = std::array::from_fn(|k| high[k].max(p[k]));
-            }
+    fn around(cloth: &[Triangle]) -> Option<Self> {
+        let corners = cloth.as_flattened();
+        if !corners.iter().all(|p| is_finite(*p)) {
+            return None;
         }
+        let (low, high) = bounds(corners.iter().copied());
         // One more than what spreads, for rounding.
         let room = REACH as f64 + 1.0;
         let low = low.map(|x| x - room * CELL);
@@ -72,15 +60,15 @@ impl Cells {
 
     /// First and one past the last cell along each axis of those that the box around a triangle touches; what is no number
     /// touches all.
-    fn touched(&self, corners: [[f64; 3]; 3]) -> [Range<usize>; 3] {
+    fn touched(&self, corners: Triangle) -> [Range<usize>; 3] {
+        let (low, high) = bounds(corners);
         std::array::from_fn(|k| {
-            let along = corners.map(|corner| corner[k]);
-            if !along.iter().all(|x| x.is_finite()) {
+            if !corners.iter().all(|corner| corner[k].is_finite()) {
                 return 0..self.count[k];
             }
             let cell = |x: f64| ((x - self.low[k]) / CELL).floor();
-            let first = cell(along.into_iter().fold(f64::INFINITY, f64::min)).max(0.0) as usize;
-            let end = (cell(along.into_iter().fold(f64::NEG_INFINITY, f64::max)) + 1.0).max(0.0) as usize;
+            let first = cell(low[k]).max(0.0) as usize;
+            let end = (cell(high[k]) + 1.0).max(0.0) as usize;
             first.min(self.count[k])..end.min(self.count[k])
         })
     }
@@ -94,14 +82,14 @@ impl Cells {
         })
     }
 
-    fn fill(&mut self, corners: [[f64; 3]; 3]) {
+    fn fill(&mut self, corners: Triangle) {
         for column in self.columns(self.touched(corners)) {
             self.is_full[column].fill(true);
         }
     }
 
     /// Whether a triangle touches a full cell.
-    fn meet(&self, corners: [[f64; 3]; 3]) -> bool {
+    fn meet(&self, corners: Triangle) -> bool {
         self.columns(self.touched(corners)).any(|column| self.is_full[column].contains(&true))
     }
 
@@ -135,7 +123,7 @@ mod tests {
         let places: Vec<[f64; 3]> = (0..2000).map(|_| point()).collect();
         let points: Vec<[f64; 3]> = places.iter().flat_map(|p| [*p; 3]).collect();
         let faces: Vec<[u32; 3]> = (0..2000).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
-        let near = |cloth: &[[f64; 3]]| near_cloth(&points, &faces, &[(cloth, &[[0, 1, 2]])]);
+        let near = |cloth: &Triangle| near_cloth(&points, &faces, &[*cloth]);
         let distance = |p: &[f64; 3]| {
             let outside = (0..3).map(|k| {
                 let [low, high] =
@@ -166,7 +154,7 @@ mod tests {
             [3.0, 3.1, 3.0],
         ];
         let triangle = [[0.0, 0.0, -0.01], [0.02, 0.0, 0.01], [0.0, 0.02, 0.01]];
-        let near = near_cloth(&points, &[[0, 1, 2], [3, 4, 5]], &[(&triangle, &[[0, 1, 2]])]);
+        let near = near_cloth(&points, &[[0, 1, 2], [3, 4, 5]], &[triangle]);
         assert_eq!(near, [true, true, true, false, false, false]);
     }
 }

@@ -84,23 +84,18 @@ impl ResolveSettings {
     /// [`ResolveError::Setting`] names the first that is out of range.
     pub fn check(&self) -> Result<(), ResolveError> {
         let fail = |setting, value, expected| Err(ResolveError::Setting { setting, value, expected });
-        if !(self.gap > 0.0 && self.gap <= Self::LARGEST_GAP) {
-            return fail("gap", self.gap, "greater than 0 and at most 0.05 m");
-        }
-        if !(0.0..=1.0).contains(&self.trigger) {
-            return fail("trigger", self.trigger, "between 0 and 1");
-        }
-        if !(self.reach >= 0.0 && self.reach <= 0.5) {
-            return fail("reach", self.reach, "between 0 and 0.5 m");
-        }
-        if !(self.farthest > 0.0 && self.farthest <= 10.0) {
-            return fail("farthest", self.farthest, "greater than 0 and at most 10 m");
-        }
-        if !(self.stretch >= 1.0 && self.stretch <= 100.0) {
-            return fail("stretch", self.stretch, "between 1 and 100");
-        }
-        if !(self.loosened >= 1.0 && self.loosened <= 100.0) {
-            return fail("loosened", self.loosened, "between 1 and 100");
+        let in_range = |value: f64, most: f64| value > 0.0 && value <= most;
+        for (setting, value, is_valid, expected) in [
+            ("gap", self.gap, in_range(self.gap, Self::LARGEST_GAP), "greater than 0 and at most 0.05 m"),
+            ("trigger", self.trigger, (0.0..=1.0).contains(&self.trigger), "between 0 and 1"),
+            ("reach", self.reach, (0.0..=0.5).contains(&self.reach), "between 0 and 0.5 m"),
+            ("farthest", self.farthest, in_range(self.farthest, 10.0), "greater than 0 and at most 10 m"),
+            ("stretch", self.stretch, (1.0..=100.0).contains(&self.stretch), "between 1 and 100"),
+            ("loosened", self.loosened, (1.0..=100.0).contains(&self.loosened), "between 1 and 100"),
+        ] {
+            if !is_valid {
+                return fail(setting, value, expected);
+            }
         }
         for (setting, value, most) in
             [("rings", self.rings, 1000), ("rounds", self.rounds, 10_000), ("sweeps", self.sweeps, 10_000)]

@@ -23,13 +23,7 @@ impl Bounds {
 
     /// The box around `points`.
     pub fn around(points: impl IntoIterator<Item = [f64; 3]>) -> Self {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for p in points {
-            for k in 0..3 {
-                low[k] = low[k].min(p[k]);
-                high[k] = high[k].max(p[k]);
-            }
-        }
+        let (low, high) = vec3::bounds(points);
         Self { low: low.map(below), high: high.map(above) }
     }
 
@@ -260,11 +254,7 @@ fn sort(faces: &mut [([f64; 3], u32)], mut block: usize) {
     if faces.len() <= WIDTH || block < WIDTH {
         return;
     }
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for (c, _) in &*faces {
-        low = std::array::from_fn(|k| low[k].min(c[k]));
-        high = std::array::from_fn(|k| high[k].max(c[k]));
-    }
+    let (low, high) = vec3::bounds(faces.iter().map(|(c, _)| *c));
     let extent = vec3::sub(high, low);
     let axis = (0..3).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
     let middle = (faces.len().div_ceil(block) / 2).max(1) * block;

@@ -3,10 +3,10 @@
 use super::FastPass;
 use crate::contact::resolve::contact::{Contact, Plane, along_line, is_tiny, normal_of};
 use crate::contact::resolve::layer_constraint::{
-    LayerConstraint, Order, OutermostSheet, STEEP, order, part_along, part_from_body,
+    LayerConstraint, OutermostSheet, STEEP, order, part_along, part_from_body, sum_over,
 };
 use crate::contact::step_filter::{Bounds, ElementPair, closest_on_edges};
-use crate::vec3::{add, add_scaled, cross, dot, normalized, scale, sub};
+use crate::vec3::{add_scaled, cross, dot, normalized, scale, sub};
 use rayon::prelude::*;
 
 /// Elements nearer than this are kept apart (m).
@@ -72,10 +72,7 @@ impl FastPass<'_> {
     fn look(&self, v: u32) -> (Option<Plane>, Vec<LayerConstraint>) {
         let (p, away) = (self.positions[v as usize], self.outward[v as usize]);
         let plane = self.planes[v as usize].filter(|plane| plane.distance < NEAR);
-        // More than half way through a limb the nearest way out is its other side: cloth goes back to its own.
-        let is_through = plane.is_some_and(|plane| plane.distance < 0.0 && dot(plane.normal, away) < 0.0);
-        let back = if is_through { self.body.exit(p, away, self.settings.farthest) } else { None };
-        (back.or(plane), self.sheets_over(v))
+        (self.body.back_from_through(plane, p, away, self.settings.farthest), self.sheets_over(v))
     }
 
     /// Of every inner garment the outermost sheet that lies less than [`REACH`] over vertex `v`.
@@ -93,11 +90,6 @@ impl FastPass<'_> {
             }
         });
         outermost.into_iter().filter_map(|sheet| sheet.over(v, self.outfit, &self.positions)).collect()
-    }
-
-    /// The direction away from the body of a face of a garment, not normalised.
-    fn direction(&self, f: u32) -> [f64; 3] {
-        self.outfit.faces[f as usize].iter().fold([0.0; 3], |sum, &v| add(sum, self.outward[v as usize]))
     }
 
     /// What has to hold in the region of `defects` and next to it.
@@ -123,7 +115,7 @@ impl FastPass<'_> {
                 continue;
             }
             let (outer, inner) = (mesh.faces[f.max(g) as usize], mesh.faces[f.min(g) as usize]);
-            if let Order::Along(away) = order(outer, inner, true, &self.outward) {
+            if let Some(away) = order(outer, inner, true, &self.outward) {
                 part_along(away, outer, inner, &self.positions, 0.5 * gap, REACH, &mut parting);
             }
         }
@@ -154,7 +146,8 @@ impl FastPass<'_> {
             let plane = &self.planes[v as usize];
             plane.as_ref().is_some_and(|plane| plane.distance > 0.0 && dot(plane.normal, normal) > 0.0)
         };
-        dot(normal, self.direction(f)) < 0.0 && !self.outfit.faces[f as usize].iter().any(seen)
+        let face = self.outfit.faces[f as usize];
+        dot(normal, sum_over(face, &self.outward)) < 0.0 && !face.iter().any(seen)
     }
 
     /// How far apart what is `height` apart (m) has to get: what is too near gets the gap, the rest only keeps from
@@ -184,10 +177,10 @@ impl FastPass<'_> {
                     return;
                 }
                 match order(mesh.faces[over as usize], mesh.faces[under as usize], is_outer, &self.outward) {
-                    Order::Along(away) => (over, Some(away)),
+                    Some(away) => (over, Some(away)),
                     // Sheets of one garment stay on the side of each other that they are on.
-                    Order::Unknown if !is_outer && !self.intersect(f, g) => (over, None),
-                    Order::Unknown => return,
+                    None if !is_outer && !self.intersect(f, g) => (over, None),
+                    None => return,
                 }
             }
         };

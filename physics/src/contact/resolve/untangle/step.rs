@@ -1,7 +1,7 @@
 //! One round: the conditions of intersections and of vertices on the wrong side, and the relaxation that meets them.
 
 use super::super::contact::{Contact, is_tiny, normal_of};
-use super::super::layer_constraint::{Order, order, part_along, part_from_body};
+use super::super::layer_constraint::{order, part_along, part_from_body, sum_over};
 use super::super::relax::{LastPasses, no_farther, relax};
 use super::super::self_intersections::part_self_intersections;
 use super::Untangling;
@@ -24,7 +24,7 @@ impl Untangling<'_> {
             let (outer, inner) = (outfit.faces[f as usize], outfit.faces[g as usize]);
             seeds.extend(outer.iter().chain(&inner));
             let has_orientation = self.orientation.is_some_and(|orientation| !orientation.is_unknown(f, g));
-            if !has_orientation && let Order::Along(away) = order(outer, inner, true, &self.outward) {
+            if !has_orientation && let Some(away) = order(outer, inner, true, &self.outward) {
                 part_along(away, outer, inner, &self.positions, 0.5 * gap, LONGEST_STEP, &mut asked);
             }
         }
@@ -71,7 +71,10 @@ impl Untangling<'_> {
         };
         let (sweeps, stretch) = (self.settings.sweeps, self.stretch);
         relax(outfit, &mut self.positions, &self.shape, &region, &contacts, stretch, (sweeps, last));
-        self.hold_back(&region);
+        for &v in &region {
+            let v = v as usize;
+            self.positions[v] = no_farther(self.input[v], self.positions[v], self.farthest);
+        }
         self.touch(&region);
     }
 
@@ -81,21 +84,13 @@ impl Untangling<'_> {
         faces.flat_map(|f| self.outfit.faces[f as usize]).collect()
     }
 
-    /// Limits the displacement of vertices.
-    fn hold_back(&mut self, region: &[u32]) {
-        for &v in region {
-            let v = v as usize;
-            self.positions[v] = no_farther(self.input[v], self.positions[v], self.farthest);
-        }
-    }
-
     /// The part of a face over a face of the body has to leave it.
     fn part_from_body(&self, f: u32, other: u32, gap: f64, found: &mut Vec<Contact>) {
         let face = self.outfit.faces[f as usize];
         let Some(lower) = self.body.tree.triangle(other).filter(|t| !is_tiny(t)) else { return };
         let normal = normal_of(&lower);
         // A face on the other side of the limb would pull cloth through it.
-        let away = face.iter().fold([0.0; 3], |sum, &v| add(sum, self.outward[v as usize]));
+        let away = sum_over(face, &self.outward);
         let seen = face.iter().fold([0.0; 3], |sum, &v| {
             add(sum, self.planes[v as usize].filter(|p| p.distance > 0.0).map_or([0.0; 3], |p| p.normal))
         });
@@ -111,10 +106,10 @@ impl Untangling<'_> {
         for &(f, g) in &self.intersections.self_pairs {
             let (one, other) = (self.outfit.faces[f as usize], self.outfit.faces[g as usize]);
             match order(one, other, false, &self.outward) {
-                Order::Along(away) => {
+                Some(away) => {
                     part_along(away, one, other, &self.positions, gap, LONGEST_STEP, &mut contacts);
                 }
-                Order::Unknown => folded.push((f, g)),
+                None => folded.push((f, g)),
             }
         }
         let before = self.positions.clone();
