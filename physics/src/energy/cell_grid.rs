@@ -11,7 +11,7 @@ const CELLS_PER_RADIUS: [i64; 2] = [2, 4];
 const DENSE: usize = 48;
 
 /// Cells are larger than the radius asks for by this share: a pair that rounding puts inside the radius is not missed.
-const SLACK: f64 = 1e-6;
+const CELL_SLACK: f64 = 1e-6;
 
 /// Points sorted by cell. Cells are kept as a sorted list, not as an array: one vertex far away costs nothing.
 pub(crate) struct CellGrid<T> {
@@ -44,7 +44,7 @@ impl<T: Real> CellGrid<T> {
     fn with_cells(positions: &[[T; 3]], radius: f64, per_radius: i64) -> Self {
         let finite = positions.iter().filter(|p| is_finite(**p));
         let (low, _) = bounds(finite.map(|p| to_f64(*p)));
-        let per_metre = per_radius as f64 / (radius * (1.0 + SLACK));
+        let per_metre = per_radius as f64 / (radius * (1.0 + CELL_SLACK));
         // Beyond 2 million cells along an axis, points share the last cell: slower, still right.
         let last = (1i64 << KEY_BITS) - 1 - 2 * KEY_MARGIN;
         let mut keyed: Vec<(u64, u32)> = positions

@@ -28,7 +28,7 @@ use crate::real::Real;
 use crate::vec3::{distance_squared, norm, sub, to_f64};
 
 /// Room for rounding in `f32`.
-const ROUNDING: f64 = 1.001;
+const BOUND_ROUNDING: f64 = 1.001;
 
 /// A bound on every entry of the gradient of `term` (weight 1) in `scene`, whose garments have the rest shapes `rest`,
 /// at `posed` and `canonical` (`[ΣV, 3]` (m)); see the module for the formulas. Infinite where there is none, NaN if a
@@ -100,7 +100,7 @@ pub fn gradient_bound<T: Real>(
             over_pairs(&|inner, outer| 3.0 * inner.posed.len().max(outer.posed.len()) as f64 * reach * reach)
         }
     };
-    ROUNDING * bound
+    BOUND_ROUNDING * bound
 }
 
 /// A garment at rest and deformed.
@@ -170,8 +170,9 @@ impl Deformed<'_> {
     }
 
     fn bending(&self) -> f64 {
-        let floor = bending::COLLAPSE_FLOOR * self.median_edge * self.median_edge;
-        let collapse = |f: u32| (bending::COLLAPSE_RATIO * 2.0 * self.rest.face_area(f as usize)).max(floor);
+        let floor = bending::HINGE_COLLAPSE_FLOOR * self.median_edge * self.median_edge;
+        let collapse =
+            |f: u32| (bending::HINGE_COLLAPSE_RATIO * 2.0 * self.rest.face_area(f as usize)).max(floor);
         let topology = Topology::new(self.rest);
         let hinges = topology.hinges.iter().map(|h| {
             let length = self.longest(h.faces[0]).max(self.longest(h.faces[1]));
@@ -207,7 +208,8 @@ impl Deformed<'_> {
         let points = outer.contact_points.at(&outer.posed, settings.layer_samples);
         let farthest = points.iter().map(distance).fold(0.0, f64::max);
         let reach = settings.layer_gate.map_or(farthest, |gate| farthest.min(aside(gate)));
-        let floor = layer_collision::nearest_vertex::COLLAPSE_FLOOR * self.median_edge * self.median_edge;
+        let floor =
+            layer_collision::nearest_vertex::NORMAL_COLLAPSE_FLOOR * self.median_edge * self.median_edge;
         let longest = (0..self.rest.face_count() as u32).map(|f| self.longest(f)).fold(0.0, f64::max);
         let turning = self.rest.faces().iter().map(|face| (*face, 3.0 * longest * reach / floor));
         let pair = settings.for_pair([self.material.thickness, outer.material.thickness]);

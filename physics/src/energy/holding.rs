@@ -19,11 +19,14 @@ use crate::vec3::{scale, to_f64};
 
 /// Blended transforms with a smaller determinant have no height before skinning: half a turn between two bones flattens the
 /// cloth that both carry. One of 0.05 belongs to bones of equal weight at 154°, beyond every joint limit.
-const SMALLEST_DETERMINANT: f64 = 0.05;
+const SMALLEST_HELD_DETERMINANT: f64 = 0.05;
 
 /// The row of every one of `transforms`, canonical → posed; zero where there is none, whose vertices are then not held.
 pub fn height_rows(transforms: &[Transform]) -> Vec<HeightRow> {
-    transforms.iter().map(|t| inverse(t, SMALLEST_DETERMINANT).map_or([0.0; 4], |rows| rows[1])).collect()
+    transforms
+        .iter()
+        .map(|t| inverse(t, SMALLEST_HELD_DETERMINANT).map_or([0.0; 4], |rows| rows[1]))
+        .collect()
 }
 
 /// The holding energy of one garment.

@@ -70,6 +70,13 @@ pub(super) fn memories(memory: Option<&mut BodyMemory>, count: usize) -> Vec<Opt
     }
 }
 
+/// Raw values of one garment and its weighted gradients by posed and canonical positions, if they are asked for.
+struct GarmentValue<T> {
+    raw: TermMap<Option<f64>>,
+    posed: Option<Vec<[T; 3]>>,
+    canonical: Option<Vec<[T; 3]>>,
+}
+
 /// Raw values of one pair and its weighted gradients at the inner and the outer garment.
 struct PairValue<T> {
     raw: TermMap<Option<f64>>,
@@ -140,66 +147,49 @@ impl<T: Real> SceneEnergy<T> {
             })
             .collect();
 
-        let gradient_count = if with_gradient { count } else { 0 };
-        let mut posed_gradient = vec![vec3::zero(); gradient_count];
-        let mut canonical_gradient = vec![vec3::zero(); gradient_count];
-        let garments: Vec<TermMap<Option<f64>>> = self
+        let garments: Vec<GarmentValue<T>> = self
             .garments
             .par_iter()
             .zip(&shared)
-            .zip(self.split(&mut posed_gradient))
-            .zip(self.split(&mut canonical_gradient))
-            .map(|(((garment, shared), mut posed_gradient), mut canonical_gradient)| {
-                let mut raw = TermMap::default();
+            .map(|(garment, shared)| {
+                let zeros = || with_gradient.then(|| vec![vec3::zero(); shared.state.posed.len()]);
+                let mut value = GarmentValue { raw: TermMap::default(), posed: zeros(), canonical: zeros() };
                 for (term, energy) in garment.energies.terms() {
                     let weight = garment.weights[term];
                     let is_canonical = garment.is_canonical(term);
                     if !is_active(weight) || is_canonical && canonical.is_empty() {
                         continue;
                     }
-                    let space = if is_canonical { &mut canonical_gradient } else { &mut posed_gradient };
+                    let space = if is_canonical { &mut value.canonical } else { &mut value.posed };
                     let target = space.as_deref_mut().map(|gradient| Weighted { weight, gradient });
-                    raw[term] = Some(energy.evaluate(&shared.state(), target));
+                    value.raw[term] = Some(energy.evaluate(&shared.state(), target));
                 }
-                raw
+                value
             })
             .collect();
+        let mut posed_gradient: Vec<[T; 3]> =
+            garments.iter().flat_map(|value| value.posed.iter().flatten()).copied().collect();
+        let canonical_gradient =
+            garments.iter().flat_map(|value| value.canonical.iter().flatten()).copied().collect();
 
         let pairs: Vec<PairValue<T>> =
             self.layers.par_iter().map(|pair| self.pair(pair, &shared, is_active, with_gradient)).collect();
-        if with_gradient {
-            let ranges = self.ranges();
-            for (pair, value) in self.layers.iter().zip(&pairs) {
-                let Some(gradients) = &value.gradients else { continue };
-                for (garment, gradient) in [pair.inner, pair.outer].into_iter().zip(gradients) {
-                    for (sum, g) in posed_gradient[ranges[garment].clone()].iter_mut().zip(gradient) {
-                        vec3::accumulate(sum, *g);
-                    }
+        let ranges = self.ranges();
+        for (pair, value) in self.layers.iter().zip(&pairs) {
+            for (garment, gradient) in
+                [pair.inner, pair.outer].into_iter().zip(value.gradients.iter().flatten())
+            {
+                for (sum, g) in posed_gradient[ranges[garment].clone()].iter_mut().zip(gradient) {
+                    vec3::accumulate(sum, *g);
                 }
             }
         }
+        let garments: Vec<TermMap<Option<f64>>> = garments.into_iter().map(|value| value.raw).collect();
         let layers: Vec<TermMap<Option<f64>>> = pairs.into_iter().map(|pair| pair.raw).collect();
         let total =
             self.garments.iter().zip(&garments).map(|(g, raw)| weighted(&g.weights, raw)).sum::<f64>()
                 + self.layers.iter().zip(&layers).map(|(l, raw)| weighted(&l.weights, raw)).sum::<f64>();
         SceneValue { total, posed_gradient, canonical_gradient, garments, layers }
-    }
-
-    /// One slice per garment of a packed gradient; `None` for an empty one.
-    fn split<'g>(&self, mut gradient: &'g mut [[T; 3]]) -> Vec<Option<&'g mut [[T; 3]]>> {
-        let wanted = !gradient.is_empty();
-        let mut slices = Vec::with_capacity(self.garments.len());
-        for garment in &self.garments {
-            slices.push(if wanted {
-                let (head, tail) =
-                    std::mem::take(&mut gradient).split_at_mut(garment.energies.vertex_count());
-                gradient = tail;
-                Some(head)
-            } else {
-                None
-            });
-        }
-        slices
     }
 
     /// Everything that more than one term needs of garment `i`, each part only if an active term does.

@@ -39,7 +39,7 @@ const CREASE_WIDTH: (f64, [f64; 2]) = (0.01, [1e-7, 1e-3]);
 const WINDOW: usize = 10;
 
 /// Less than this share of all that was gained, in units of the tolerance, gained over [`WINDOW`] iterations, is no progress.
-const LEAST_GAIN: f64 = 1e-6;
+const LEAST_PROGRESS: f64 = 1e-6;
 
 /// Lowers the energy of `problem` from posed positions `start` `[ΣV, 3]` (m) until it cannot or may not be lowered any
 /// more; [`Solution::stop`] says which. `observer` sees the start and every accepted step, and can end the search.
@@ -221,7 +221,7 @@ fn is_progressing(history: &[Step], tolerance: f64) -> bool {
     let Some(earlier) = history.len().checked_sub(WINDOW + 1) else { return true };
     let energy = |i: usize| history[i].energy;
     let last = history.len() - 1;
-    energy(earlier) - energy(last) > LEAST_GAIN * tolerance * (energy(0) - energy(last))
+    energy(earlier) - energy(last) > LEAST_PROGRESS * tolerance * (energy(0) - energy(last))
 }
 
 fn first_state(problem: &Problem<'_>, start: &[[f64; 3]]) -> Result<SolverState, EquilibriumError> {

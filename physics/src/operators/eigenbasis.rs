@@ -11,7 +11,7 @@ use crate::rows::CompressedRows;
 const MASS_FLOOR: f64 = 1e-6;
 
 /// The smallest area of a component that has a basis, relative to the whole.
-const AREA_FLOOR: f64 = 1e-12;
+const COMPONENT_AREA_FLOOR: f64 = 1e-12;
 
 /// Components of up to this many vertices are solved densely.
 const DENSE_LIMIT: usize = 200;
@@ -76,7 +76,7 @@ pub fn eigenbasis(laplacian: &SparseMatrix, mass: &[f64], count: usize) -> Resul
 ///
 /// Not those of the faces: a face collapsed to a point has no entries, and a vertex with only such faces hangs on nothing.
 fn members(laplacian: &SparseMatrix, mass: &[f64]) -> Vec<Vec<u32>> {
-    let smallest_area = AREA_FLOOR * mass.iter().sum::<f64>();
+    let smallest_area = COMPONENT_AREA_FLOOR * mass.iter().sum::<f64>();
     let mut sets = DisjointSets::new(mass.len());
     for vertex in 0..mass.len() {
         laplacian.row(vertex).0.iter().for_each(|&neighbour| sets.join(vertex as u32, neighbour));

@@ -14,10 +14,10 @@ use crate::operators::SparseMatrix;
 use crate::operators::cholesky::Cholesky;
 
 /// Columns added per step: more than the multiplicity that a symmetric shape gives an eigenvalue (5 for an icosahedron).
-const BLOCK: usize = 8;
+const BLOCK_COLUMNS: usize = 8;
 
 /// A pair has converged at this residual of the inverted operator, relative to its eigenvalue there.
-const TOLERANCE: f64 = 1e-9;
+const RESIDUAL_TOLERANCE: f64 = 1e-9;
 
 /// Restarts with one shift. None or one are usual.
 const RESTART_LIMIT: usize = 8;
@@ -95,22 +95,22 @@ fn with_shift(
     let n = matrix.rows();
     let factor =
         Cholesky::new(&shifted(matrix, shift)).ok_or(Failure::Factorisation("the sparse factorisation"))?;
-    let capacity = (count * 5 / 2 + 6 * BLOCK).min(n - BLOCK);
+    let capacity = (count * 5 / 2 + 6 * BLOCK_COLUMNS).min(n - BLOCK_COLUMNS);
     // Each look at the Ritz values is a dense eigenvalue problem; it must stay rare against the steps between.
-    let between_checks = (count / 4).max(4 * BLOCK);
+    let between_checks = (count / 4).max(4 * BLOCK_COLUMNS);
     let mut space = Krylov::new(n, capacity, kernel, 1.0 / shift, |block| factor.solve_in_place(block));
-    let mut next_check = count + count / 2 + 2 * BLOCK;
+    let mut next_check = count + count / 2 + 2 * BLOCK_COLUMNS;
     let mut restarts = 0;
     loop {
         let rest = space.expand(|block| factor.solve_in_place(block));
-        let full = space.filled + BLOCK > capacity;
+        let full = space.filled + BLOCK_COLUMNS > capacity;
         if !full && space.filled < next_check {
             space.append(&rest.directions);
             continue;
         }
         next_check = space.filled + between_checks;
         let ritz = space.ritz(&rest.coupling, count).ok_or(Failure::Factorisation("Rayleigh–Ritz"))?;
-        if ritz.largest_residual <= TOLERANCE {
+        if ritz.largest_residual <= RESIDUAL_TOLERANCE {
             return Ok(LanczosOutcome::Converged(space.refined(&ritz, &rest, count)));
         }
         if full {
@@ -122,7 +122,7 @@ fn with_shift(
             }
             restarts += 1;
             // Keeping some unwanted pairs makes the next cycle converge faster; it still gains a third of the space.
-            let kept = (count + count / 4 + BLOCK).min(capacity - 2 * BLOCK);
+            let kept = (count + count / 4 + BLOCK_COLUMNS).min(capacity - 2 * BLOCK_COLUMNS);
             space.restart(&ritz, kept);
             next_check = capacity;
         }
@@ -201,7 +201,7 @@ impl Krylov {
             space.basis[(i, 0)] = kernel[i];
         }
         space.projected[(0, 0)] = kernel_value;
-        let mut block = Mat::from_fn(n, BLOCK, |_, _| space.random.symmetric());
+        let mut block = Mat::from_fn(n, BLOCK_COLUMNS, |_, _| space.random.symmetric());
         operator(block.as_mut());
         space.project_out(&mut block);
         let start = space.orthonormalise(block);
@@ -210,17 +210,17 @@ impl Krylov {
     }
 
     fn append(&mut self, block: &Mat<f64>) {
-        self.basis.as_mut().subcols_mut(self.filled, BLOCK).copy_from(block);
-        self.filled += BLOCK;
+        self.basis.as_mut().subcols_mut(self.filled, BLOCK_COLUMNS).copy_from(block);
+        self.filled += BLOCK_COLUMNS;
     }
 
     /// Applies the operator to the newest block, records its projection, and returns the rest.
     fn expand(&mut self, operator: impl Fn(faer::MatMut<'_, f64>)) -> ResidualBlock {
-        let start = self.filled - BLOCK;
-        let mut image = self.basis.as_ref().subcols(start, BLOCK).to_owned();
+        let start = self.filled - BLOCK_COLUMNS;
+        let mut image = self.basis.as_ref().subcols(start, BLOCK_COLUMNS).to_owned();
         operator(image.as_mut());
         let overlap = self.project_out(&mut image);
-        for j in 0..BLOCK {
+        for j in 0..BLOCK_COLUMNS {
             for i in 0..self.filled {
                 self.projected[(i, start + j)] = overlap[(i, j)];
                 self.projected[(start + j, i)] = overlap[(i, j)];
@@ -249,8 +249,8 @@ impl Krylov {
     /// direction) is replaced by a random new direction with coupling zero.
     fn orthonormalise(&mut self, mut block: Mat<f64>) -> ResidualBlock {
         let n = block.nrows();
-        let mut coupling = Mat::<f64>::zeros(BLOCK, BLOCK);
-        for j in 0..BLOCK {
+        let mut coupling = Mat::<f64>::zeros(BLOCK_COLUMNS, BLOCK_COLUMNS);
+        for j in 0..BLOCK_COLUMNS {
             let before = norm(&block, j);
             part_from_earlier(&mut block, j, |i, overlap| coupling[(i, j)] += overlap);
             let after = norm(&block, j);
@@ -273,7 +273,7 @@ impl Krylov {
         if removed > 1e-8 {
             self.project_out_once(&mut block);
         }
-        for j in 0..BLOCK {
+        for j in 0..BLOCK_COLUMNS {
             let length = norm(&block, j).max(f64::MIN_POSITIVE);
             divide(&mut block, j, length);
         }
@@ -286,7 +286,7 @@ impl Krylov {
         let (ascending, vectors) = dense_eigenpairs(self.projected.as_ref().submatrix(0, 0, size, size))?;
         let coefficients = Mat::from_fn(size, size, |i, j| vectors[(i, size - 1 - j)]);
         let values: Vec<f64> = ascending.into_iter().rev().collect();
-        let tail = coefficients.as_ref().submatrix(size - BLOCK, 0, BLOCK, count);
+        let tail = coefficients.as_ref().submatrix(size - BLOCK_COLUMNS, 0, BLOCK_COLUMNS, count);
         let residuals = coupling * tail;
         let largest_residual =
             (0..count).map(|j| norm(&residuals, j) / values[j].max(f64::MIN_POSITIVE)).fold(0.0, f64::max);
@@ -312,7 +312,7 @@ impl Krylov {
     /// right. The change is orthogonal to the space and as small as the residual, so orthonormality survives.
     fn refined(&self, ritz: &Ritz, rest: &ResidualBlock, count: usize) -> Mat<f64> {
         let mut vectors = self.combine(ritz, count);
-        let correction = Mat::from_fn(BLOCK, count, |i, j| ritz.residuals[(i, j)] / ritz.values[j]);
+        let correction = Mat::from_fn(BLOCK_COLUMNS, count, |i, j| ritz.residuals[(i, j)] / ritz.values[j]);
         matmul(vectors.as_mut(), Accum::Add, rest.directions.as_ref(), correction.as_ref(), 1.0, Par::Seq);
         vectors
     }

@@ -76,6 +76,7 @@ impl SparseMatrix {
     }
 
     /// The entry at `(row, column)`, zero where none is stored.
+    #[cfg(test)]
     pub fn get(&self, row: usize, column: u32) -> f64 {
         let (columns, values) = self.row(row);
         columns.binary_search(&column).map_or(0.0, |at| values[at])

@@ -31,7 +31,7 @@ pub struct SurfacePoint {
 }
 
 /// Below this distance (m) the direction from the closest point is rounding, and the pseudo-normal replaces it.
-const CONTACT_DISTANCE: f64 = 1e-10;
+const TOUCHING_DISTANCE: f64 = 1e-10;
 
 impl SurfacePoint {
     /// Whether `p`, the point that it is closest to, lies behind its pseudo-normal.
@@ -43,7 +43,7 @@ impl SurfacePoint {
     pub(crate) fn signed(&self, p: [f64; 3], is_inside: bool) -> (f64, [f64; 3]) {
         let length = self.distance_squared.sqrt();
         let sign = if is_inside { -1.0 } else { 1.0 };
-        let direction = match length > CONTACT_DISTANCE {
+        let direction = match length > TOUCHING_DISTANCE {
             true => vec3::scale(vec3::sub(p, self.position), sign / length),
             false => self.normal,
         };
@@ -52,6 +52,7 @@ impl SurfacePoint {
 }
 
 /// Accelerated closest-point queries on one fixed surface.
+#[derive(Debug)]
 pub struct ClosestPoint {
     positions: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
@@ -59,15 +60,6 @@ pub struct ClosestPoint {
     /// Leaf of the tree → face; none for one that is never closest.
     leaves: Vec<Option<u32>>,
     at_vertex: CompressedRows<u32>,
-}
-
-impl std::fmt::Debug for ClosestPoint {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("ClosestPoint")
-            .field("vertices", &self.positions.len())
-            .field("faces", &self.faces.len())
-            .finish_non_exhaustive()
-    }
 }
 
 impl ClosestPoint {

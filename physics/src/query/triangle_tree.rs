@@ -13,6 +13,7 @@ use super::triangle_point::{box_distance_squared, closest_on_triangle};
 ///
 /// Faces that are no triangle take part in nothing: an index out of range, a corner that is not finite, or no area (corners
 /// exactly on one line, such as repeated positions).
+#[derive(Debug)]
 pub struct TriangleTree<'a> {
     positions: &'a [[f64; 3]],
     faces: &'a [[u32; 3]],
@@ -26,15 +27,6 @@ pub struct TriangleTree<'a> {
 pub(crate) struct KeptTree {
     bvh: Bvh,
     kept: Vec<u32>,
-}
-
-impl std::fmt::Debug for TriangleTree<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("TriangleTree")
-            .field("faces", &self.faces.len())
-            .field("skipped", &self.skipped())
-            .finish_non_exhaustive()
-    }
 }
 
 impl<'a> TriangleTree<'a> {

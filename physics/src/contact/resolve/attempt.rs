@@ -1,6 +1,6 @@
 //! Attempts: the first one, those on a body that yields, and those that start from the result of another one.
 
-use super::body::Body;
+use super::body::SoftBody;
 use super::budget::Budget;
 use super::clearance::{Clearance, YieldedBody};
 use super::count::certified;
@@ -28,7 +28,7 @@ pub(super) fn resolved_further<E: From<ResolveError>>(
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
     most: usize,
-    further: impl FnOnce(&Body<'_>, Resolved, Task<'_>) -> Result<Resolved, E>,
+    further: impl FnOnce(&SoftBody<'_>, Resolved, Task<'_>) -> Result<Resolved, E>,
 ) -> Result<Resolved, E> {
     let budget = &Budget::new(settings, layers.len());
     settings.check()?;
@@ -45,7 +45,7 @@ pub(super) fn resolved_further<E: From<ResolveError>>(
         found.relax_strain(&drawn, task, strain_relaxation::TIMES);
     } else {
         let yielded = budget.preparing(|| YieldedBody::ample(&drawn, layers.len()));
-        let yielding = Body::new(drawn, layers.len(), yielded.as_ref());
+        let yielding = SoftBody::new(drawn, layers.len(), yielded.as_ref());
         found.certificate.count_narrow(&yielding.drawn);
         if found.certificate.between() <= most {
             found.yield_to_cloth(&yielding, task);
@@ -65,7 +65,7 @@ fn resolved_once(body: &Surface<f64>, task: Task<'_>) -> Resolved {
     let mut found = simply_resolved(&drawn, task);
     if !found.certificate.is_clear() {
         let yielded = budget.preparing(|| YieldedBody::ample(&drawn, layers.len()));
-        let yielding = Body::new(drawn, layers.len(), yielded.as_ref());
+        let yielding = SoftBody::new(drawn, layers.len(), yielded.as_ref());
         found.certificate.count_narrow(&yielding.drawn);
         found.yield_to_cloth(&yielding, task);
     }
@@ -81,7 +81,7 @@ fn simply_resolved(drawn: &BodyObstacle<'_>, task: Task<'_>) -> Resolved {
 
 impl Resolved {
     /// [`super::resolve`] on a `body` that yields, taken if it is better. Nothing if the budget is spent.
-    fn yield_to_cloth(&mut self, body: &Body<'_>, task: Task<'_>) {
+    fn yield_to_cloth(&mut self, body: &SoftBody<'_>, task: Task<'_>) {
         if !task.budget.is_spent() {
             let found = untangled(body.obstacle(), task, None);
             let found = settled(body, found, Clearance::AMPLE, task);
@@ -117,7 +117,12 @@ impl Resolved {
 }
 
 /// The result of untangling, out of the body's clearance where that works, with its certificate.
-pub(super) fn settled(body: &Body<'_>, found: Untangled, clearance: Clearance, task: Task<'_>) -> Resolved {
+pub(super) fn settled(
+    body: &SoftBody<'_>,
+    found: Untangled,
+    clearance: Clearance,
+    task: Task<'_>,
+) -> Resolved {
     let mut resolved = judged(&body.drawn, found, task);
     ClearanceWithdrawal { body, task, clearance }.improve(&mut resolved);
     resolved

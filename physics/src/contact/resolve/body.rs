@@ -6,7 +6,7 @@ use super::clearance::{Clearance, YieldedBody};
 use super::obstacle::BodyObstacle;
 
 /// A posed body near some garments.
-pub(super) struct Body<'a> {
+pub(super) struct SoftBody<'a> {
     /// As given: what a certificate counts against. Faces that yield are noted.
     pub drawn: BodyObstacle<'a>,
     garments: usize,
@@ -14,7 +14,7 @@ pub(super) struct Body<'a> {
     yielded_obstacle: OnceCell<BodyObstacle<'a>>,
 }
 
-impl<'a> Body<'a> {
+impl<'a> SoftBody<'a> {
     /// The body that is `drawn` near so many `garments`, and how it has `yielded` to them, if it has.
     pub fn new(mut drawn: BodyObstacle<'a>, garments: usize, yielded: Option<&'a YieldedBody>) -> Self {
         if let Some(yielded) = yielded {

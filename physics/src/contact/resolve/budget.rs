@@ -12,7 +12,7 @@ const OVERLAPPING: usize = 1000;
 /// Such a body gets one in so many of the rounds.
 const SHORTER: usize = 4;
 /// One in so many of the rounds is kept for the end of a path.
-const LAST: usize = 10;
+const LAST_SHARE: usize = 10;
 
 /// Counts rounds, which do not depend on the machine, and, where a limit is asked for, wall time.
 pub(super) struct Budget {
@@ -67,7 +67,7 @@ impl Budget {
 
     /// Whether only the last rounds are left: what is under way had better come to its end.
     pub fn is_nearly_spent(&self) -> bool {
-        self.spent() >= self.rounds.get() - self.rounds.get() / LAST || self.is_late()
+        self.spent() >= self.rounds.get() - self.rounds.get() / LAST_SHARE || self.is_late()
     }
 
     /// What `prepare` returns; its time counts as that to prepare a body.

@@ -7,26 +7,26 @@
 
 use rayon::prelude::*;
 
-use super::contact::{along_line, normal_of};
+use super::condition::{along_line, normal_of};
 use super::obstacle::{BodyObstacle, touching};
 use crate::contact::{Triangle, TriangleTree};
 use crate::query::{FaceSide, Surface};
 use crate::vec3::{add_scaled, bounds, dot};
 
 /// Distance that two facing parts of the body keep (m), for straight triangles around a limb…
-const CLEARANCE: f64 = 0.006;
+const BODY_CLEARANCE: f64 = 0.006;
 /// …and for the two sheets of each garment (m).
 const CLEARANCE_PER_GARMENT: f64 = 0.002;
 /// Two surfaces face each other where their normals have a cosine below this.
-const FACING: f64 = -0.3;
+const FACING_PARTS: f64 = -0.3;
 /// Farthest that the surface of another part is looked for (m).
-const DEEPEST: f64 = 0.08;
+const DEEPEST_PART: f64 = 0.08;
 /// Largest yield of a vertex (m).
-const LONGEST_STEP: f64 = 0.04;
+const LONGEST_YIELD: f64 = 0.04;
 /// Rings of neighbours that yield along, each half as far.
 const RINGS: usize = 2;
 /// How far outside the surface a vertex is asked whether it is inside another part (m).
-const LOOK_OUT: f64 = 1e-6;
+const VERTEX_LOOK_OUT: f64 = 1e-6;
 
 /// Where a body yields: where it lies inside itself, and where two parts are too near to each other for cloth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,7 +87,7 @@ impl YieldedBody {
     ) -> Option<Self> {
         let body = drawn.surface;
         let (mut steps, pinched) =
-            steps(drawn, CLEARANCE + CLEARANCE_PER_GARMENT * garments as f64, clearance.is_deep)?;
+            steps(drawn, BODY_CLEARANCE + CLEARANCE_PER_GARMENT * garments as f64, clearance.is_deep)?;
         if let Some(Before { steps: before, most }) = before {
             steps.iter_mut().zip(before).for_each(|(step, was)| *step = step.clamp(was - most, was + most));
         }
@@ -138,13 +138,14 @@ fn steps(drawn: &BodyObstacle<'_>, clearance: f64, is_deep: bool) -> Option<(Vec
         }
         let (p, n) = (positions[v], surface.normals[v]);
         let is_inside =
-            all_inside[v] || some_inside[v] && union.winding_number(add_scaled(p, LOOK_OUT, n)) >= 1;
+            all_inside[v] || some_inside[v] && union.winding_number(add_scaled(p, VERTEX_LOOK_OUT, n)) >= 1;
         let apart = match is_inside {
-            true => facing_surface(tree, faces, v as u32, -DEEPEST, p, n)
-                .or_else(|| is_deep.then(|| -nearest_facing(tree, faces, v as u32, p, n).unwrap_or(DEEPEST))),
+            true => facing_surface(tree, faces, v as u32, -DEEPEST_PART, p, n).or_else(|| {
+                is_deep.then(|| -nearest_facing(tree, faces, v as u32, p, n).unwrap_or(DEEPEST_PART))
+            }),
             false => facing_surface(tree, faces, v as u32, clearance, p, n),
         };
-        apart.map_or(0.0, |apart| (0.5 * (clearance - apart)).clamp(0.0, LONGEST_STEP))
+        apart.map_or(0.0, |apart| (0.5 * (clearance - apart)).clamp(0.0, LONGEST_YIELD))
     };
     let mut steps: Vec<f64> = (0..positions.len()).into_par_iter().with_min_len(256).map(missing).collect();
     for _ in 0..RINGS {
@@ -173,7 +174,7 @@ fn facing_surface(
         let triangle = tree.triangle(f)?;
         let (along, _) = along_line(p, n, &triangle)?;
         let is_in_reach = along * reach.signum() > 0.0 && along.abs() <= reach.abs();
-        (is_in_reach && dot(normal_of(&triangle), n) < FACING).then_some(along)
+        (is_in_reach && dot(normal_of(&triangle), n) < FACING_PARTS).then_some(along)
     };
     let along = tree.faces_in_box(bounds([p, add_scaled(p, reach, n)]));
     along.filter_map(faces_it).min_by(|a, b| a.abs().total_cmp(&b.abs()))
@@ -190,7 +191,7 @@ fn nearest_facing(
 ) -> Option<f64> {
     let looks_elsewhere =
         |f: u32, triangle: &Triangle| !faces[f as usize].contains(&v) && dot(normal_of(triangle), n) < 0.0;
-    tree.nearest(p, DEEPEST, looks_elsewhere)
+    tree.nearest(p, DEEPEST_PART, looks_elsewhere)
 }
 
 #[cfg(test)]
@@ -227,7 +228,7 @@ mod tests {
         for (apart, garments) in [(0.19, 1), (0.203, 1), (0.17, 3)] {
             let (body, yielded) = yielded_obstacle(apart, garments);
             let yielded = yielded.unwrap();
-            let clearance = CLEARANCE + CLEARANCE_PER_GARMENT * garments as f64;
+            let clearance = BODY_CLEARANCE + CLEARANCE_PER_GARMENT * garments as f64;
             assert!(space(&body, apart) < 0.5 * clearance);
             let space = space(&yielded.surface, apart);
             assert!((0.9 * clearance..1.3 * clearance).contains(&space), "{apart}: {space} of {clearance}");
@@ -279,7 +280,7 @@ mod tests {
             // Nowhere farther than half of what overlaps along the line of the centres.
             let most = steps(apart).into_iter().fold(0.0, f64::max);
             assert!(
-                most <= 0.5 * (0.2 - apart + CLEARANCE + CLEARANCE_PER_GARMENT) * 1.05 + 1e-9,
+                most <= 0.5 * (0.2 - apart + BODY_CLEARANCE + CLEARANCE_PER_GARMENT) * 1.05 + 1e-9,
                 "{apart}: {most}"
             );
         }

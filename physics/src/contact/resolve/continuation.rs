@@ -6,7 +6,7 @@
 //! exit is right. A step that raises the number of intersections is halved.
 
 use super::attempt::{FEW_PAIRS, resolved_further, settled};
-use super::body::Body;
+use super::body::SoftBody;
 use super::budget::Budget;
 use super::clearance::YieldedBody;
 use super::garment::check;
@@ -32,7 +32,7 @@ pub fn resolve_along<E: From<ResolveError>>(
     mut sample_at: impl FnMut(f64) -> Result<PathSample, E>,
 ) -> Result<Resolved, E> {
     let most = if settings.steps > 0 { FEW_PAIRS } else { usize::MAX };
-    let along = |end: &Body<'_>, mut best: Resolved, task: Task<'_>| {
+    let along = |end: &SoftBody<'_>, mut best: Resolved, task: Task<'_>| {
         if !best.certificate.is_clear() && settings.steps > 0 && !task.budget.is_spent() {
             let mut checked_at = |share: f64| Ok::<_, E>(checked(sample_at(share)?, layers)?);
             let path_end = PathEnd::new(checked_at(1.0)?, layers);
@@ -66,7 +66,7 @@ pub fn resolve_after<E: From<ResolveError>>(
     check_transforms(&before.transforms, layers)?;
     let drawn = budget.preparing(|| BodyObstacle::near_layers(body, layers));
     let yielded = budget.preparing(|| YieldedBody::ample(&drawn, layers.len()));
-    let end = &Body::new(drawn, layers.len(), yielded.as_ref());
+    let end = &SoftBody::new(drawn, layers.len(), yielded.as_ref());
     let step_lengths =
         if before.intersections == 0 { StepLengths::OF_FRAME } else { StepLengths::OF_INTERSECTED_FRAME };
     let task = Task { layers, settings, budget };

@@ -1,10 +1,10 @@
 //! Counts the certificate from nothing: all pairs of triangles, and the depth of every vertex.
 
-use super::body::Body;
+use super::body::SoftBody;
 use super::certificate::Certificate;
 use super::clearance::YieldedBody;
 use super::garment::{at, check};
-use super::near::MARGIN;
+use super::near::NEAR_MARGIN;
 use super::obstacle::BodyObstacle;
 use super::{Layer, ResolveError};
 use crate::contact::{
@@ -29,7 +29,7 @@ pub(super) fn certified_around(body: &Surface<f64>, layers: &[Layer<'_>]) -> Cer
     let mut found = certificate(&drawn, layers);
     if found.body_triangle_pairs > 0 {
         let yielded = YieldedBody::ample(&drawn, layers.len());
-        found.count_narrow(&Body::new(drawn, layers.len(), yielded.as_ref()).drawn);
+        found.count_narrow(&SoftBody::new(drawn, layers.len(), yielded.as_ref()).drawn);
     }
     found
 }
@@ -91,6 +91,6 @@ pub(super) fn certified(
 
 /// Whether nothing moved so far from `layers` that it could meet more of the body than what is near those.
 pub(super) fn is_near(layers: &[Layer<'_>], positions: &[Vec<[f64; 3]>]) -> bool {
-    let is_near = |(p, q): (&[f64; 3], &[f64; 3])| vec3::norm(vec3::sub(*q, *p)) <= MARGIN;
+    let is_near = |(p, q): (&[f64; 3], &[f64; 3])| vec3::norm(vec3::sub(*q, *p)) <= NEAR_MARGIN;
     layers.iter().zip(positions).all(|(layer, moved)| layer.positions.iter().zip(moved).all(is_near))
 }

@@ -9,7 +9,7 @@ use crate::rows::{CompressedRows, faces_at_vertices};
 use crate::vec3::{self, norm, sub};
 
 /// Positions farther from the origin than this are refused (m): the exact predicates would hold, but no distance would.
-pub const FARTHEST: f64 = 1e3;
+pub const FARTHEST_POSITION: f64 = 1e3;
 
 /// Everything about a garment that its positions do not change: made once, used for every frame and body.
 #[derive(Debug)]
@@ -99,7 +99,7 @@ pub(super) fn triangles(layers: &[Layer<'_>]) -> Vec<Triangle> {
 
 /// Whether the input can be worked on.
 pub(super) fn check(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<(), ResolveError> {
-    let is_near = |p: &[f64; 3]| vec3::is_finite(*p) && p.iter().all(|x| x.abs() <= FARTHEST);
+    let is_near = |p: &[f64; 3]| vec3::is_finite(*p) && p.iter().all(|x| x.abs() <= FARTHEST_POSITION);
     let is_whole = |f: &[u32; 3]| f.iter().all(|&v| body.positions.get(v as usize).is_some_and(is_near));
     if !body.faces.iter().any(is_whole) {
         return Err(ResolveError::EmptyBody);

@@ -8,8 +8,8 @@ use std::ops::RangeInclusive;
 
 use rayon::prelude::*;
 
-use super::contact::{Contact, along_line, is_tiny, normal_of, overlap};
-use super::outfit::Outfit;
+use super::condition::{Condition, along_line, is_tiny, normal_of, overlap};
+use super::packed_cloth::PackedCloth;
 use crate::contact::{Triangle, TriangleTree};
 use crate::mesh::vertex_normals;
 use crate::vec3::{add, add_scaled, bounds, dot, neg, norm, normalized, scale, sub};
@@ -39,15 +39,15 @@ pub(super) struct LayerConstraint {
 }
 
 impl LayerConstraint {
-    pub fn contact(&self, gap: f64) -> Contact {
-        Contact::vertex_over(self.vertex, (self.face, self.barycentric), self.normal, gap)
+    pub fn contact(&self, gap: f64) -> Condition {
+        Condition::vertex_over(self.vertex, (self.face, self.barycentric), self.normal, gap)
     }
 }
 
 /// Every vertex with a sheet of an inner garment less than `reach` above it or less than `watch` below it.
 /// `trees` are those of the garments, `outward` the direction away from the body, zero where there is none.
 pub(super) fn layer_constraints(
-    outfit: &Outfit<'_>,
+    outfit: &PackedCloth<'_>,
     trees: &[TriangleTree<'_>],
     positions: &[[f64; 3]],
     outward: &[[f64; 3]],
@@ -67,7 +67,7 @@ pub(super) fn layer_constraints(
 }
 
 fn look(
-    outfit: &Outfit<'_>,
+    outfit: &PackedCloth<'_>,
     tree: &TriangleTree<'_>,
     inner: usize,
     positions: &[[f64; 3]],
@@ -117,7 +117,12 @@ impl OutermostSheet {
     }
 
     /// What `vertex` has to stay over.
-    pub fn over(self, vertex: u32, outfit: &Outfit<'_>, positions: &[[f64; 3]]) -> Option<LayerConstraint> {
+    pub fn over(
+        self,
+        vertex: u32,
+        outfit: &PackedCloth<'_>,
+        positions: &[[f64; 3]],
+    ) -> Option<LayerConstraint> {
         let (above, f, barycentric) = self.found?;
         let face = outfit.faces[f as usize];
         let normal = sheet_normal(&face.map(|v| positions[v as usize]), self.away);
@@ -168,7 +173,7 @@ pub(super) fn part_along(
     positions: &[[f64; 3]],
     gap: f64,
     longest_step: f64,
-    found: &mut Vec<Contact>,
+    found: &mut Vec<Condition>,
 ) {
     let upper = first.map(|v| positions[v as usize]);
     let lower = second.map(|v| positions[v as usize]);
@@ -186,7 +191,12 @@ pub(super) fn part_along(
     let normal = if flatter.0 > STEEP { flatter.1 } else { away };
     for corner in overlap(&upper, &lower, normal).iter().filter(|c| c.height < gap) {
         let target = gap.min(corner.height + longest_step);
-        found.push(Contact::face_points((first, corner.at_upper), (second, corner.at_lower), normal, target));
+        found.push(Condition::face_points(
+            (first, corner.at_upper),
+            (second, corner.at_lower),
+            normal,
+            target,
+        ));
     }
 }
 
@@ -196,14 +206,14 @@ pub(super) fn part_from_body(
     positions: &[[f64; 3]],
     ground: &Triangle,
     (gap, longest_step): (f64, f64),
-    found: &mut Vec<Contact>,
+    found: &mut Vec<Condition>,
 ) {
     let (upper, normal) = (face.map(|v| positions[v as usize]), normal_of(ground));
     // Of the ground under a corner, as a height along the normal.
     let level = dot(normal, ground[0]);
     for corner in overlap(&upper, ground, normal).iter().filter(|corner| corner.height < gap) {
         let target = level + gap.min(corner.height + longest_step);
-        found.push(Contact::new(face, corner.at_upper, normal, target));
+        found.push(Condition::new(face, corner.at_upper, normal, target));
     }
 }
 
@@ -211,7 +221,7 @@ pub(super) fn part_from_body(
 /// body's surface, zero where unknown) say for a component, smoothed over wrinkles. Unlike the direction from the nearest
 /// point of the body they do not change where cloth has gone through other cloth towards another part of the body.
 pub(super) fn outward(
-    outfit: &Outfit<'_>,
+    outfit: &PackedCloth<'_>,
     positions: &[[f64; 3]],
     away: impl Fn(u32) -> [f64; 3],
 ) -> Vec<[f64; 3]> {

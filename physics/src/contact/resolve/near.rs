@@ -6,17 +6,17 @@ use crate::vec3::{bounds, is_finite};
 use std::ops::Range;
 
 /// Cells in which cloth is looked for (m).
-const CELL: f64 = 0.05;
+const NEAR_CELL: f64 = 0.05;
 /// What lies in a cell with cloth, or so many cells beside one along each axis, is near.
-const REACH: usize = 2;
+const NEAR_CELLS: usize = 2;
 /// Cloth over a box of more cells, 125 m³ here, is near everything.
 const MOST_CELLS: f64 = 1e6;
 
 /// Cloth that moves no farther than this (m) meets only faces that are near; a little less than all, for rounding.
-pub(super) const MARGIN: f64 = REACH as f64 * CELL * (1.0 - 1e-9);
+pub(super) const NEAR_MARGIN: f64 = NEAR_CELLS as f64 * NEAR_CELL * (1.0 - 1e-9);
 
 /// Which vertices of a surface belong to a face near a triangle of the `cloth`; all where none does. Faces count, however large:
-/// none that comes closer than [`MARGIN`] is left out.
+/// none that comes closer than [`NEAR_MARGIN`] is left out.
 pub(super) fn near_cloth(points: &[[f64; 3]], surface: &[[u32; 3]], cloth: &[Triangle]) -> Vec<bool> {
     let all = || vec![true; points.len()];
     let Some(mut cells) = Cells::around(cloth) else { return all() };
@@ -50,9 +50,9 @@ impl Cells {
         }
         let (low, high) = bounds(corners.iter().copied());
         // One more than what spreads, for rounding.
-        let room = REACH as f64 + 1.0;
-        let low = low.map(|x| x - room * CELL);
-        let sides: [f64; 3] = std::array::from_fn(|k| ((high[k] - low[k]) / CELL).floor() + 1.0 + room);
+        let room = NEAR_CELLS as f64 + 1.0;
+        let low = low.map(|x| x - room * NEAR_CELL);
+        let sides: [f64; 3] = std::array::from_fn(|k| ((high[k] - low[k]) / NEAR_CELL).floor() + 1.0 + room);
         let is_small = sides.iter().product::<f64>() <= MOST_CELLS;
         let count = sides.map(|side| side as usize);
         is_small.then(|| Self { low, count, is_full: vec![false; count.iter().product()] })
@@ -66,7 +66,7 @@ impl Cells {
             if !corners.iter().all(|corner| corner[k].is_finite()) {
                 return 0..self.count[k];
             }
-            let cell = |x: f64| ((x - self.low[k]) / CELL).floor();
+            let cell = |x: f64| ((x - self.low[k]) / NEAR_CELL).floor();
             let first = cell(low[k]).max(0.0) as usize;
             let end = (cell(high[k]) + 1.0).max(0.0) as usize;
             first.min(self.count[k])..end.min(self.count[k])
@@ -93,11 +93,11 @@ impl Cells {
         self.columns(self.touched(corners)).any(|column| self.is_full[column].contains(&true))
     }
 
-    /// Fills what is within [`REACH`] cells of a full one along each axis.
+    /// Fills what is within [`NEAR_CELLS`] cells of a full one along each axis.
     fn spread(&mut self) {
         let [_, deep, tall] = self.count;
         for stride in [1, tall, deep * tall] {
-            for _ in 0..REACH {
+            for _ in 0..NEAR_CELLS {
                 let before = self.is_full.clone();
                 // There is room around what was filled, so that nothing spreads over an edge of the box.
                 for (cell, _) in before.iter().enumerate().filter(|(_, is_full)| **is_full) {
@@ -133,8 +133,8 @@ mod tests {
             outside.fold(0.0, f64::max)
         };
         for (p, near) in points.iter().zip(near(&triangle)) {
-            assert!(near || distance(p) >= MARGIN);
-            assert!(!near || distance(p) <= MARGIN + CELL);
+            assert!(near || distance(p) >= NEAR_MARGIN);
+            assert!(!near || distance(p) <= NEAR_MARGIN + NEAR_CELL);
         }
         let huge = [[-900.0; 3], [900.0, 0.0, 0.0], [0.0, 900.0, 0.0]];
         assert!(near(&huge).iter().all(|n| *n));

@@ -1,9 +1,9 @@
 //! The posed body as what garments have to stay outside of.
 
 use super::Layer;
-use super::contact::{Plane, along_line, normal_of};
+use super::condition::{Plane, along_line, normal_of};
 use super::garment::triangles;
-use super::near::{MARGIN, near_cloth};
+use super::near::{NEAR_MARGIN, near_cloth};
 use crate::contact::{Triangle, TriangleTree};
 use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint, UnionDistance};
 use crate::vec3::{add, add_scaled, bounds, dot, scale, sub};
@@ -109,7 +109,7 @@ impl<'a> BodyObstacle<'a> {
             }
         };
         let far = found.distance_squared.sqrt();
-        if far >= MARGIN {
+        if far >= NEAR_MARGIN {
             // The nearest face may not be near cloth, and the normal of another one says nothing.
             is_inside = self.union.as_ref().is_some_and(|union| union.winding_number(p) >= 1);
         }
@@ -124,9 +124,7 @@ impl<'a> BodyObstacle<'a> {
         };
         Some(BodyView { far, plane })
     }
-}
 
-impl BodyObstacle<'_> {
     /// The half-space that the body leaves to `p`, where `plane` is that of the nearest way out: more than half way through a limb
     /// that is the limb's other side, and cloth goes back to its own, `away` from the body, at most `farthest` (m).
     pub fn back_from_through(
@@ -176,9 +174,9 @@ mod tests {
         let near: Vec<bool> = body.positions.iter().map(|p| p[0] > 0.3).collect();
         let obstacle = BodyObstacle::new(&body, near);
         let behind = obstacle.look([-0.8, 0.1, 0.0]).unwrap();
-        assert!(behind.plane.unwrap().distance > MARGIN);
+        assert!(behind.plane.unwrap().distance > NEAR_MARGIN);
         let deep = obstacle.look([-0.1, 0.1, 0.0]).unwrap();
-        assert!(deep.plane.unwrap().distance < -MARGIN);
+        assert!(deep.plane.unwrap().distance < -NEAR_MARGIN);
         let open = Surface::from_mesh(&shapes::grid(0.2, 0.2, 4, 4));
         let all = vec![true; open.positions.len()];
         let under = BodyObstacle::new(&open, all).look([0.1, 0.1, -0.5]).unwrap();

@@ -3,12 +3,12 @@
 use std::sync::OnceLock;
 
 use super::attempt::{FEW_PAIRS, settled};
-use super::body::Body;
+use super::body::SoftBody;
 use super::clearance::{Before, YieldedBody};
 use super::contact_orientation::ContactOrientation;
 use super::garment::{at, check};
 use super::obstacle::BodyObstacle;
-use super::outfit::Outfit;
+use super::packed_cloth::PackedCloth;
 use super::step_lengths::StepLengths;
 use super::task::Task;
 use super::untangle::{Untangled, untangled};
@@ -32,7 +32,7 @@ const YIELD_PER_PATH: f64 = 0.5;
 pub(super) struct Path<'a, 'b> {
     pub task: Task<'a>,
     /// The body at 1.
-    pub end: &'a Body<'b>,
+    pub end: &'a SoftBody<'b>,
     pub step_lengths: StepLengths,
 }
 
@@ -62,7 +62,7 @@ impl PathNode {
     fn orientation(&self, layers: &[Layer<'_>]) -> &ContactOrientation {
         let positions = || self.state.positions.concat();
         self.orientation.get_or_init(|| {
-            ContactOrientation::of(&Outfit::new(layers), &positions(), self.orientation_before.as_ref())
+            ContactOrientation::of(&PackedCloth::new(layers), &positions(), self.orientation_before.as_ref())
         })
     }
 }
@@ -215,7 +215,7 @@ impl Path<'_, '_> {
         let places = [at(layers, &sample.draped), start.clone()].concat();
         let drawn = BodyObstacle::near_layers(&sample.body, &places);
         let yielded = YieldedBody::of(&drawn, layers.len(), self.step_lengths.clearance, before);
-        let body = Body::new(drawn, layers.len(), yielded.as_ref());
+        let body = SoftBody::new(drawn, layers.len(), yielded.as_ref());
         StepResult { untangled: untangle(body.obstacle(), &start), yielded: body.steps() }
     }
 }

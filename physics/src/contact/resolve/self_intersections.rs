@@ -7,8 +7,8 @@
 use std::collections::HashMap;
 
 use super::RestGarment;
-use super::contact::{Contact, is_tiny, normal_of, overlap};
-use super::outfit::Outfit;
+use super::condition::{Condition, is_tiny, normal_of, overlap};
+use super::packed_cloth::PackedCloth;
 use crate::mesh::DisjointSets;
 use crate::vec3::{add, cross, dot, neg, scale, sub};
 
@@ -19,7 +19,7 @@ const COUNTED_RINGS: usize = 10;
 #[derive(Debug, Default)]
 pub(super) struct PartingConditions {
     /// Conditions that part two sheets.
-    pub contacts: Vec<Contact>,
+    pub contacts: Vec<Condition>,
     /// Vertices of crumples, to be smoothed.
     pub crumpled: Vec<u32>,
 }
@@ -66,12 +66,12 @@ fn parting_conditions(
 /// crumples. Those are smoothed: in positions and shape where a garment has a pair `known` from the input; otherwise towards the
 /// shape.
 pub(super) fn part_self_intersections(
-    outfit: &Outfit<'_>,
+    outfit: &PackedCloth<'_>,
     (pairs, known): (&[(u32, u32)], &[(u32, u32)]),
     gap: f64,
     positions: &[[f64; 3]],
     (smoothed, shape): (&mut [[f64; 3]], &mut [[f64; 3]]),
-) -> (Vec<Contact>, Vec<u32>) {
+) -> (Vec<Condition>, Vec<u32>) {
     let (mut contacts, mut crumpled) = (Vec::new(), Vec::new());
     for pairs in pairs.chunk_by(|a, b| outfit.garment_of_face(a.0) == outfit.garment_of_face(b.0)) {
         let g = outfit.garment_of_face(pairs[0].0);
@@ -171,8 +171,8 @@ fn part(
     for corner in overlap(&upper, &lower, normal) {
         let sides = ((face, corner.at_upper), (other, corner.at_lower));
         let contact = match is_below {
-            false if corner.height < gap => Contact::face_points(sides.0, sides.1, normal, gap),
-            true if corner.height > -gap => Contact::face_points(sides.0, sides.1, neg(normal), gap),
+            false if corner.height < gap => Condition::face_points(sides.0, sides.1, normal, gap),
+            true if corner.height > -gap => Condition::face_points(sides.0, sides.1, neg(normal), gap),
             _ => continue,
         };
         found.contacts.push(contact);

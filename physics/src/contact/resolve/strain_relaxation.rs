@@ -10,7 +10,7 @@ use super::count::certified;
 use super::garment::{at, triangles};
 use super::near::near_cloth;
 use super::obstacle::BodyObstacle;
-use super::outfit::Outfit;
+use super::packed_cloth::PackedCloth;
 use super::relax::{keep_length, no_farther};
 use super::task::Task;
 use super::{Layer, Resolved};
@@ -23,7 +23,7 @@ pub(super) const TIMES: usize = 20;
 pub(super) const TIMES_IN_FRAME: usize = 2;
 /// Where relaxing edges that are too long lowers the energy by a smaller share of what it had risen by, those that are too short
 /// are relaxed as well, which crumples cloth a little; where that lowers it by less, it ends.
-const LEAST_GAIN: f64 = 0.02;
+const LEAST_RELAXED: f64 = 0.02;
 /// Passes over the edges in a move.
 const PASSES: usize = 20;
 /// Farthest that a vertex is moved at once (m).
@@ -46,7 +46,7 @@ impl Resolved {
         let surface = drawn.surface;
         let near = near_cloth(&surface.positions, &surface.faces, &triangles(&at(layers, &self.positions)));
         let is_near = |face: &&[u32; 3]| face.iter().any(|&v| near[v as usize]);
-        let outfit = Outfit::new(layers);
+        let outfit = PackedCloth::new(layers);
         let mesh = contact_mesh(&outfit, surface.positions.len(), surface.faces.iter().filter(is_near));
         let mut positions = self.positions.concat();
         positions.extend(&surface.positions);
@@ -62,7 +62,7 @@ impl Resolved {
 
 /// The faces of an outfit and some of a body with so many vertices.
 pub(super) fn contact_mesh<'a>(
-    outfit: &Outfit<'_>,
+    outfit: &PackedCloth<'_>,
     body_vertices: usize,
     body_faces: impl Iterator<Item = &'a [u32; 3]>,
 ) -> ContactMesh {
@@ -74,7 +74,7 @@ pub(super) fn contact_mesh<'a>(
 /// Garments whose edges relax.
 pub(super) struct StrainRelaxation<'a> {
     /// The garments as they were before the post-process.
-    outfit: &'a Outfit<'a>,
+    outfit: &'a PackedCloth<'a>,
     /// What elements stay apart (m).
     margin: f64,
     budget: &'a Budget,
@@ -83,7 +83,7 @@ pub(super) struct StrainRelaxation<'a> {
 }
 
 impl<'a> StrainRelaxation<'a> {
-    pub fn new(outfit: &'a Outfit<'a>, Task { settings, budget, .. }: Task<'a>) -> Self {
+    pub fn new(outfit: &'a PackedCloth<'a>, Task { settings, budget, .. }: Task<'a>) -> Self {
         Self { outfit, margin: settings.trigger * settings.gap, budget, only_stretched: true }
     }
 
@@ -110,7 +110,7 @@ impl<'a> StrainRelaxation<'a> {
             } else {
                 filter.step_freely(&relaxed, positions);
             }
-            if gain < LEAST_GAIN && !std::mem::take(&mut self.only_stretched) {
+            if gain < LEAST_RELAXED && !std::mem::take(&mut self.only_stretched) {
                 break;
             }
         }

@@ -1,12 +1,12 @@
 //! Takes cloth out of clearance again: afterwards the body yields only where it lies inside itself.
 
-use super::body::Body;
+use super::body::SoftBody;
 use super::certificate::Certificate;
 use super::clearance::Clearance;
 use super::contact_orientation::ContactOrientation;
 use super::count::certified;
 use super::garment::at;
-use super::outfit::Outfit;
+use super::packed_cloth::PackedCloth;
 use super::task::Task;
 use super::untangle::{Untangled, untangled};
 use super::{ResolveSettings, Resolved};
@@ -18,7 +18,7 @@ const GAPS: [f64; 2] = [1.0, 0.3];
 
 /// A body that withdraws its clearance.
 pub(super) struct ClearanceWithdrawal<'a, 'b> {
-    pub body: &'a Body<'b>,
+    pub body: &'a SoftBody<'b>,
     pub task: Task<'a>,
     pub clearance: Clearance,
 }
@@ -48,7 +48,7 @@ impl ClearanceWithdrawal<'_, '_> {
 
     /// Step by step from `now`, where no garment intersects another; cloth keeps its contact orientation.
     fn slowly(&self, best: &mut Resolved, mut now: Vec<Vec<[f64; 3]>>, settings: &ResolveSettings) {
-        let outfit = Outfit::new(self.task.layers);
+        let outfit = PackedCloth::new(self.task.layers);
         let (mut share, mut step, mut with_body) = (1.0, WITHDRAWAL_STEPS.0, usize::MAX);
         while share > 0.0 && step >= WITHDRAWAL_STEPS.1 && !self.task.budget.is_spent() {
             let next = f64::max(share - step, 0.0);

@@ -34,7 +34,7 @@ pub(super) struct InnerCloth {
 }
 
 /// One outer point against the point of the inner surface that is closest to it.
-struct Contact {
+struct SurfaceContact {
     outer: usize,
     corners: [u32; 3],
     barycentric: [f64; 3],
@@ -112,7 +112,7 @@ impl InnerCloth {
         closest: &ClosestPoint,
         outer: &OuterPoints<'_, T>,
         settings: &EnergySettings,
-    ) -> Vec<Contact> {
+    ) -> Vec<SurfaceContact> {
         let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate.unwrap_or_default());
         let of = |(outer, p): (usize, &[T; 3])| {
             let p = to_f64(*p);
@@ -130,7 +130,7 @@ impl InnerCloth {
         found: &SurfacePoint,
         epsilon: f64,
         gate: LayerGate,
-    ) -> Option<Contact> {
+    ) -> Option<SurfaceContact> {
         let (distance, direction) = found.signed(p, found.is_behind(p));
         let penalty = penalty(distance, epsilon, gate.depth);
         if penalty[0] == 0.0 {
@@ -143,7 +143,7 @@ impl InnerCloth {
             return None;
         }
         let gradients = interpolated_gradients(values, closest.corners(found.face), found, p);
-        Some(Contact {
+        Some(SurfaceContact {
             outer,
             corners,
             barycentric: found.barycentric,

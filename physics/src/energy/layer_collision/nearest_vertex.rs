@@ -24,10 +24,10 @@ use crate::rows::{CompressedRows, corners_at_vertices};
 use crate::vec3::{accumulate, add, axpy, cross, dot, norm, norm_squared, scale, sub, to_f64, zero};
 
 /// τ in units of `|N|` at rest.
-pub const COLLAPSE_RATIO: f64 = 1e-4;
+pub const NORMAL_COLLAPSE_RATIO: f64 = 1e-4;
 
 /// Smallest τ in units of the squared median edge.
-pub const COLLAPSE_FLOOR: f64 = 1e-6;
+pub const NORMAL_COLLAPSE_FLOOR: f64 = 1e-6;
 
 /// What stays the same of an inner garment.
 #[derive(Debug, Clone)]
@@ -50,24 +50,24 @@ pub struct PosedVertices<T: Real> {
 
 /// One outer point against its inner vertex.
 #[derive(Debug, Clone, Copy)]
-struct Contact {
+struct VertexContact {
     inner: u32,
     energy: f64,
     /// `∂E/∂d`.
     slope: f64,
 }
 
-const NO_CONTACT: Contact = Contact { inner: 0, energy: 0.0, slope: 0.0 };
+const NO_CONTACT: VertexContact = VertexContact { inner: 0, energy: 0.0, slope: 0.0 };
 
 impl InnerVertices {
     pub(super) fn new(rest: &TriMesh) -> Self {
         let median_edge = rest.median_edge_length();
         let faces: Arc<[[u32; 3]]> = rest.faces().into();
         let corners_at = corners_at_vertices(rest.vertex_count(), &faces);
-        let floor = COLLAPSE_FLOOR * median_edge * median_edge;
+        let floor = NORMAL_COLLAPSE_FLOOR * median_edge * median_edge;
         let collapse_squared = area_normals(rest.positions(), &faces, &corners_at)
             .into_iter()
-            .map(|n| (COLLAPSE_RATIO * norm(n)).max(floor).powi(2))
+            .map(|n| (NORMAL_COLLAPSE_RATIO * norm(n)).max(floor).powi(2))
             .collect();
         Self { faces, corners_at, collapse_squared, median_edge }
     }
@@ -100,7 +100,7 @@ impl InnerVertices {
         targets: Option<[Weighted<'_, T>; 2]>,
     ) -> f64 {
         let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate);
-        let contacts: Vec<Contact> = outer
+        let contacts: Vec<VertexContact> = outer
             .at
             .par_iter()
             .with_min_len(GRAIN / 2)
@@ -137,7 +137,7 @@ impl InnerVertices {
         p: [T; 3],
         epsilon: f64,
         gate: Option<LayerGate>,
-    ) -> Option<Contact> {
+    ) -> Option<VertexContact> {
         let (v, _) = posed.index.nearest(p);
         let offset = sub(to_f64(p), to_f64(*inner.get(v as usize)?));
         let (normal, _) = self.normal(posed, v as usize)?;
@@ -153,7 +153,7 @@ impl InnerVertices {
         if excess <= 0.0 {
             return None;
         }
-        Some(Contact { inner: v, energy: excess.powi(3), slope: -3.0 * excess * excess })
+        Some(VertexContact { inner: v, energy: excess.powi(3), slope: -3.0 * excess * excess })
     }
 
     /// Adds the gradient through `N` to the corners of the faces: a face with corners `a b c` adds `a×b + b×c + c×a` to `N`

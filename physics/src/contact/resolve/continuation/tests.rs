@@ -44,7 +44,7 @@ fn a_rising_knee_takes_the_sheet_along() {
     let task = Task { layers: &layers, settings: &settings, budget: &Budget::new(&settings, 1) };
     let drawn = BodyObstacle::near_layers(&sample.body, &layers);
     let yielded = YieldedBody::ample(&drawn, 1);
-    let end = &Body::new(drawn, 1, yielded.as_ref());
+    let end = &SoftBody::new(drawn, 1, yielded.as_ref());
     let path = Path { task, end, step_lengths: StepLengths::FROM_T_POSE };
     let first = sample_at(0.0).unwrap();
     let positions = first.draped.clone();

@@ -2,7 +2,7 @@
 
 use super::FastPass;
 use crate::contact::resolve::certificate::Certificate;
-use crate::contact::resolve::contact::Plane;
+use crate::contact::resolve::condition::Plane;
 use crate::contact::resolve::count::{certified_around, counted, is_near};
 use crate::contact::resolve::garment::at;
 use crate::contact::{ReportBody, Triangle, TriangleTree};

@@ -14,10 +14,10 @@ mod tests;
 use super::attempt::FEW_SELF_PAIRS;
 use super::budget::Budget;
 use super::certificate::Certificate;
-use super::contact::{Contact, Plane};
+use super::condition::{Condition, Plane};
 use super::layer_constraint::outward;
 use super::obstacle::BodyObstacle;
-use super::outfit::Outfit;
+use super::packed_cloth::PackedCloth;
 use super::relax::{LastPasses, no_farther, relax};
 use super::self_intersections::part_self_intersections;
 use super::strain_relaxation::{StrainRelaxation, TIMES, contact_mesh};
@@ -53,7 +53,7 @@ const FILTER_MARGIN: f64 = 0.05;
 /// near the garments.
 pub(super) fn fast_pass(drawn: &BodyObstacle<'_>, task: Task<'_>) -> Option<Resolved> {
     let Task { layers, settings, budget } = task;
-    let outfit = Outfit::new(layers);
+    let outfit = PackedCloth::new(layers);
     let surface = drawn.surface;
     let near = drawn.tree.part().iter().map(|&f| &surface.faces[f as usize]);
     let mesh = contact_mesh(&outfit, surface.positions.len(), near);
@@ -95,7 +95,7 @@ fn is_good(certificate: &Certificate, most_self_intersections: usize) -> bool {
 
 /// The state of an outfit between rounds.
 struct FastPass<'a> {
-    outfit: &'a Outfit<'a>,
+    outfit: &'a PackedCloth<'a>,
     body: &'a BodyObstacle<'a>,
     settings: &'a ResolveSettings,
     filter: StepFilter<'a>,
@@ -111,12 +111,12 @@ struct FastPass<'a> {
     /// Pairs of the input's garments with themselves, ascending.
     known_self_intersections: FacePairs,
     /// Conditions that separated triangles so far: without them their neighbours would pull them in again.
-    remembered: Vec<Contact>,
+    remembered: Vec<Condition>,
 }
 
 impl<'a> FastPass<'a> {
     fn new(
-        outfit: &'a Outfit<'a>,
+        outfit: &'a PackedCloth<'a>,
         body: &'a BodyObstacle<'a>,
         mesh: &'a ContactMesh,
         settings: &'a ResolveSettings,

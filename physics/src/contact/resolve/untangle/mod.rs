@@ -6,13 +6,13 @@ use rayon::prelude::*;
 
 use super::ResolveSettings;
 use super::budget::Budget;
-use super::contact::{Contact, Plane};
+use super::condition::{Condition, Plane};
 use super::contact_orientation::ContactOrientation;
 use super::defects::Defects;
 use super::detect::IntersectingPairs;
 use super::layer_constraint::{LayerConstraint, layer_constraints, outward};
 use super::obstacle::BodyObstacle;
-use super::outfit::Outfit;
+use super::packed_cloth::PackedCloth;
 use super::task::Task;
 use crate::query::triangle_tree::{KeptTree, TriangleTree, self_triangle_pairs};
 
@@ -28,8 +28,8 @@ const PATIENCE_IN_LONG_STEP: usize = 3;
 const ROUNDS_FOR_GAPS: usize = 3;
 
 /// The state of an outfit between rounds.
-pub(super) struct Untangling<'a> {
-    outfit: &'a Outfit<'a>,
+pub(super) struct UntanglingState<'a> {
+    outfit: &'a PackedCloth<'a>,
     body: &'a BodyObstacle<'a>,
     settings: &'a ResolveSettings,
     budget: &'a Budget,
@@ -53,21 +53,21 @@ pub(super) struct Untangling<'a> {
     /// Intersections of the input's garments with themselves, ascending.
     known_self_intersections: Vec<(u32, u32)>,
     /// Conditions of all intersections so far: without them its neighbours would pull a mended place apart again.
-    remembered: Vec<Contact>,
+    remembered: Vec<Condition>,
     /// Orders the sheets, if it is known from a step before; otherwise the outward directions do.
     orientation: Option<&'a ContactOrientation>,
 }
 
 /// The best state so far.
 #[derive(Default)]
-struct Best {
+struct BestState {
     defects: Option<Defects>,
     positions: Vec<[f64; 3]>,
     /// Rounds since it was found.
     stale: usize,
 }
 
-impl Best {
+impl BestState {
     fn look(&mut self, defects: Defects, positions: &[[f64; 3]]) {
         self.stale += 1;
         if self.defects.is_none_or(|least| defects < least) {
@@ -76,9 +76,9 @@ impl Best {
     }
 }
 
-impl<'a> Untangling<'a> {
+impl<'a> UntanglingState<'a> {
     fn new(
-        outfit: &'a Outfit<'a>,
+        outfit: &'a PackedCloth<'a>,
         body: &'a BodyObstacle<'a>,
         Task { settings, budget, .. }: Task<'a>,
         orientation: Option<&'a ContactOrientation>,
@@ -140,7 +140,7 @@ impl<'a> Untangling<'a> {
 
     /// Rounds within the limits as they are. The intersections are those of the positions afterwards.
     fn attempt(&mut self) {
-        let mut best = Best::default();
+        let mut best = BestState::default();
         let patience = match (self.orientation, self.settings.is_patient) {
             (Some(_), _) => PATIENCE_WITH_ORIENTATION,
             (None, true) => PATIENCE,
@@ -282,8 +282,8 @@ pub(super) fn untangled(
     orientation: Option<&ContactOrientation>,
 ) -> Untangled {
     let Task { layers, settings, .. } = task;
-    let outfit = Outfit::new(layers);
-    let mut untangling = Untangling::new(&outfit, body, task, orientation);
+    let outfit = PackedCloth::new(layers);
+    let mut untangling = UntanglingState::new(&outfit, body, task, orientation);
     untangling.run();
     let positions = outfit.split(&untangling.positions);
     // Where contact orientation is kept, pinched pairs have been counted already.

@@ -31,7 +31,7 @@ impl Plane {
 
 /// `Σ weight·(vertex·normal) ≥ target` over up to six vertices.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Contact {
+pub(super) struct Condition {
     pub vertices: [u32; 6],
     pub weights: [f64; 6],
     pub count: u8,
@@ -39,7 +39,7 @@ pub(super) struct Contact {
     pub target: f64,
 }
 
-impl Contact {
+impl Condition {
     /// Of up to six vertices with a weight each.
     pub fn new<const N: usize>(vertices: [u32; N], weights: [f64; N], normal: [f64; 3], target: f64) -> Self {
         let mut contact =
@@ -219,7 +219,7 @@ mod tests {
     #[test]
     fn enforcing_meets_the_condition_and_moves_only_what_may_move() {
         let mut positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let contact = Contact::new([0, 1, 2], [0.2, 0.3, 0.5], [0.0, 0.0, 1.0], 0.1);
+        let contact = Condition::new([0, 1, 2], [0.2, 0.3, 0.5], [0.0, 0.0, 1.0], 0.1);
         assert!(contact.enforce(&mut positions, &[true, false, true]));
         assert_eq!(positions[1], [1.0, 0.0, 0.0]);
         let height = 0.2 * positions[0][2] + 0.5 * positions[2][2];

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::Layer;
 
 /// All garments packed one behind the other, innermost first.
-pub(super) struct Outfit<'a> {
+pub(super) struct PackedCloth<'a> {
     pub layers: &'a [Layer<'a>],
     /// First vertex of every garment, and the end.
     vertex_starts: Vec<u32>,
@@ -16,7 +16,7 @@ pub(super) struct Outfit<'a> {
     pub faces: Vec<[u32; 3]>,
 }
 
-impl<'a> Outfit<'a> {
+impl<'a> PackedCloth<'a> {
     pub fn new(layers: &'a [Layer<'a>]) -> Self {
         let mut outfit = Self {
             layers,
