@@ -44,23 +44,20 @@ pub fn gradient_bound<T: Real>(
     canonical: &[[T; 3]],
 ) -> f64 {
     assert_eq!(rest.len(), scene.garments.len(), "one rest mesh per garment");
-    let mut garments = Vec::with_capacity(rest.len());
-    let mut start = 0;
-    for (mesh, garment) in rest.iter().zip(&scene.garments) {
-        let range = start..start + mesh.vertex_count();
-        start = range.end;
-        garments.push(Deformed {
-            rest: mesh,
-            median_edge: mesh.median_edge_length(),
-            posed: posed[range.clone()].iter().map(|p| to_f64(*p)).collect(),
-            canonical: canonical[range].iter().map(|p| to_f64(*p)).collect(),
-            reference: garment.holding_reference.iter().map(|p| to_f64(*p)).collect(),
-            pull_back: garment.pull_back.as_deref(),
-            contact_points: garment.energies.contact_points(),
-            thickness_below: garment.most_thickness(),
-            material: *garment.energies.material(),
-        });
-    }
+    let wide = |positions: &[[T; 3]]| positions.iter().map(|p| to_f64(*p)).collect();
+    let parts = scene.garments.iter().zip(rest).zip(scene.ranges());
+    let deformed = parts.map(|((garment, mesh), range)| Deformed {
+        rest: mesh,
+        median_edge: mesh.median_edge_length(),
+        posed: wide(&posed[range.clone()]),
+        canonical: wide(&canonical[range]),
+        reference: wide(&garment.holding_reference),
+        pull_back: garment.pull_back.as_deref(),
+        contact_points: garment.energies.contact_points(),
+        thickness_below: garment.most_thickness(),
+        material: *garment.energies.material(),
+    });
+    let garments: Vec<Deformed<'_>> = deformed.collect();
     let settings = &scene.settings;
     let of_garments = |bound: &dyn Fn(&Deformed<'_>) -> f64| garments.iter().map(bound).fold(0.0, f64::max);
     let to_body = |g: &Deformed<'_>| {

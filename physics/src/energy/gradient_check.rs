@@ -92,20 +92,21 @@ pub fn check_gradient(
     raw_value(&scene.value(posed, canonical), term)?;
     let edges = scene.garments.iter().map(|g| g.energies.as_inner().median_edge());
     let edge = edges.fold(LONGEST_EDGE, f64::min);
-    Some(if scene.needs_canonical() {
-        let value = |x: &[[f64; 3]]| scene.value(posed, x).total;
-        let gradient = |x: &[[f64; 3]]| {
-            let value = scene.evaluate(posed, x);
-            (value.total, value.canonical_gradient)
-        };
-        check_function(&value, &gradient, canonical, edge, settings)
-    } else {
-        let value = |x: &[[f64; 3]]| scene.value(x, canonical).total;
-        let gradient = |x: &[[f64; 3]]| {
-            let value = scene.evaluate(x, canonical);
-            (value.total, value.posed_gradient)
-        };
-        check_function(&value, &gradient, posed, edge, settings)
+    Some(match scene.needs_canonical() {
+        true => {
+            let gradient = |x: &[[f64; 3]]| {
+                let value = scene.evaluate(posed, x);
+                (value.total, value.canonical_gradient)
+            };
+            check_function(&|x| scene.value(posed, x).total, &gradient, canonical, edge, settings)
+        }
+        false => {
+            let gradient = |x: &[[f64; 3]]| {
+                let value = scene.evaluate(x, canonical);
+                (value.total, value.posed_gradient)
+            };
+            check_function(&|x| scene.value(x, canonical).total, &gradient, posed, edge, settings)
+        }
     })
 }
 

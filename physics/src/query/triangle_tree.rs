@@ -22,13 +22,6 @@ pub struct TriangleTree<'a> {
     kept: Vec<u32>,
 }
 
-/// The tree of a [`TriangleTree`] without the mesh, to be kept while that moves.
-#[derive(Default)]
-pub(crate) struct KeptTree {
-    bvh: Bvh,
-    kept: Vec<u32>,
-}
-
 impl<'a> TriangleTree<'a> {
     /// Builds the tree in O(F log F).
     pub fn new(positions: &'a [[f64; 3]], faces: &'a [[u32; 3]]) -> Self {
@@ -46,26 +39,6 @@ impl<'a> TriangleTree<'a> {
             .filter(|(face, bounds)| is_part(*face, bounds))
             .unzip();
         Self { positions, faces, bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes), kept }
-    }
-
-    /// As [`new`](Self::new), with the tree of the same faces elsewhere, whose boxes are fitted anew in O(F): for meshes that are
-    /// still in about the same shape. Pairs are the same.
-    pub(crate) fn refitted(tree: KeptTree, positions: &'a [[f64; 3]], faces: &'a [[u32; 3]]) -> Self {
-        let KeptTree { mut bvh, kept } = tree;
-        let boxes = triangle_boxes(positions, faces);
-        if !boxes.iter().map(|(face, _)| face).eq(&kept) {
-            return Self::new(positions, faces);
-        }
-        for (leaf, (_, bounds)) in (0..).zip(boxes) {
-            bvh.insert_or_update_partially(bounds, leaf, 0.0);
-        }
-        bvh.refit_without_opt();
-        Self { positions, faces, bvh, kept }
-    }
-
-    /// The tree alone, for [`refitted`](Self::refitted).
-    pub(crate) fn into_kept(self) -> KeptTree {
-        KeptTree { bvh: self.bvh, kept: self.kept }
     }
 
     /// Positions of the mesh, `[V, 3]` (m).

@@ -20,8 +20,10 @@ pub(super) struct Budget {
     time: Option<Duration>,
     rounds: Cell<usize>,
     spent: Cell<usize>,
-    body_time: Cell<Duration>,
-    certificate_time: Cell<Duration>,
+    /// Time to prepare bodies.
+    pub body_time: Cell<Duration>,
+    /// Time for certificates.
+    pub certificate_time: Cell<Duration>,
 }
 
 impl Budget {
@@ -78,16 +80,6 @@ impl Budget {
     /// What `certify` returns; its time counts as that for a certificate.
     pub fn certifying<R>(&self, certify: impl FnOnce() -> R) -> R {
         timed(&self.certificate_time, certify)
-    }
-
-    /// Time to prepare bodies.
-    pub fn body_time(&self) -> Duration {
-        self.body_time.get()
-    }
-
-    /// Time for certificates.
-    pub fn certificate_time(&self) -> Duration {
-        self.certificate_time.get()
     }
 
     /// Wall time since it began.

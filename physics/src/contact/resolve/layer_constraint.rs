@@ -54,38 +54,25 @@ pub(super) fn layer_constraints(
     (reach, watch): (f64, f64),
 ) -> Vec<LayerConstraint> {
     let end = outfit.vertex_count() as u32;
+    let look = |inner: usize, vertex: u32| {
+        let (p, away) = (positions[vertex as usize], outward[vertex as usize]);
+        if away == [0.0; 3] {
+            return None;
+        }
+        let along = bounds([add_scaled(p, -watch, away), add_scaled(p, reach, away)]);
+        let first = outfit.faces_of_garment(inner).start;
+        let mut outermost = OutermostSheet { from: p, away, heights: -watch..=reach, found: None };
+        for f in trees[inner].faces_in_box(along) {
+            outermost.offer(first + f, outfit.faces[(first + f) as usize], positions, outward);
+        }
+        outermost.over(vertex, outfit, positions)
+    };
     (0..outfit.len().saturating_sub(1))
         .flat_map(|inner| {
-            let outer = outfit.vertices(inner).end..end;
-            outer
-                .into_par_iter()
-                .with_min_len(256)
-                .filter_map(|v| look(outfit, &trees[inner], inner, positions, outward, v, (reach, watch)))
-                .collect::<Vec<_>>()
+            let outer = (outfit.vertices(inner).end..end).into_par_iter().with_min_len(256);
+            outer.filter_map(|vertex| look(inner, vertex)).collect::<Vec<_>>()
         })
         .collect()
-}
-
-fn look(
-    outfit: &PackedCloth<'_>,
-    tree: &TriangleTree<'_>,
-    inner: usize,
-    positions: &[[f64; 3]],
-    outward: &[[f64; 3]],
-    vertex: u32,
-    (reach, watch): (f64, f64),
-) -> Option<LayerConstraint> {
-    let (p, away) = (positions[vertex as usize], outward[vertex as usize]);
-    if away == [0.0; 3] {
-        return None;
-    }
-    let along = bounds([add_scaled(p, -watch, away), add_scaled(p, reach, away)]);
-    let first = outfit.faces_of_garment(inner).start;
-    let mut outermost = OutermostSheet { from: p, away, heights: -watch..=reach, found: None };
-    for f in tree.faces_in_box(along) {
-        outermost.offer(first + f, outfit.faces[(first + f) as usize], positions, outward);
-    }
-    outermost.over(vertex, outfit, positions)
 }
 
 /// Of the sheets of one garment that a vertex sees along its direction away from the body, the outermost.

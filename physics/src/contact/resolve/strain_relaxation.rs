@@ -4,6 +4,7 @@
 //! the strain energy has risen in the end, small moves bring edges towards their rest lengths. Each move passes the step filter,
 //! so that it makes no intersection, and is taken if the energy falls.
 
+use super::Resolved;
 use super::budget::Budget;
 use super::certificate::strain_joule;
 use super::count::certified;
@@ -13,7 +14,6 @@ use super::obstacle::BodyObstacle;
 use super::packed_cloth::PackedCloth;
 use super::relax::{keep_length, no_farther};
 use super::task::Task;
-use super::{Layer, Resolved};
 use crate::contact::step_filter::{ContactMesh, StepFilter};
 use crate::vec3::distance_squared;
 
@@ -30,17 +30,13 @@ const PASSES: usize = 20;
 const FARTHEST_AT_ONCE: f64 = 0.002;
 
 impl Resolved {
-    /// Whether the strain energy has risen from that of `layers`.
-    pub(super) fn is_strained(&self, layers: &[Layer<'_>]) -> bool {
-        self.certificate.strain_joule() > strain_joule(layers)
-    }
-
     /// Lowers the strain energy where it has risen from that before the post-process, by at most so many moves (`times`) of what
     /// was moved before, none of which makes an intersection. Strict limits (`settings.loosened`) allow none of this, nor does a
     /// budget of which the time is over.
     pub(super) fn relax_strain(&mut self, drawn: &BodyObstacle<'_>, task: Task<'_>, times: usize) {
         let Task { layers, settings, budget } = task;
-        if settings.loosened <= 1.0 || !self.is_strained(layers) || budget.is_late() {
+        let has_risen = self.certificate.strain_joule() > strain_joule(layers);
+        if settings.loosened <= 1.0 || !has_risen || budget.is_late() {
             return;
         }
         let surface = drawn.surface;
@@ -84,7 +80,7 @@ pub(super) struct StrainRelaxation<'a> {
 
 impl<'a> StrainRelaxation<'a> {
     pub fn new(outfit: &'a PackedCloth<'a>, Task { settings, budget, .. }: Task<'a>) -> Self {
-        Self { outfit, margin: settings.trigger * settings.gap, budget, only_stretched: true }
+        Self { outfit, margin: settings.least_gap(), budget, only_stretched: true }
     }
 
     /// Relaxes the garments at the start of `positions`, those of the `filter`, until their strain energy is what it was before
@@ -173,7 +169,7 @@ impl<'a> StrainRelaxation<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ResolveSettings, RestGarment, certify};
+    use super::super::{Layer, ResolveSettings, RestGarment, certify};
     use super::*;
     use crate::mesh::shapes::{self, SplitMix};
     use crate::query::Surface;

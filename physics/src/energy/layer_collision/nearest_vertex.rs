@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::outer_points::OuterPoints;
 use crate::energy::elements::GRAIN;
-use crate::energy::{EnergySettings, LayerGate, Weighted};
+use crate::energy::{EnergySettings, Weighted};
 use crate::mesh::TriMesh;
 use crate::query::VertexIndex;
 use crate::real::Real;
@@ -100,12 +100,26 @@ impl InnerVertices {
         targets: Option<[Weighted<'_, T>; 2]>,
     ) -> f64 {
         let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate);
-        let contacts: Vec<VertexContact> = outer
-            .at
-            .par_iter()
-            .with_min_len(GRAIN / 2)
-            .map(|&p| self.contact(inner, posed, p, epsilon, gate).unwrap_or(NO_CONTACT))
-            .collect();
+        let contact = |p: &[T; 3]| {
+            let (v, _) = posed.index.nearest(*p);
+            let offset = sub(to_f64(*p), to_f64(*inner.get(v as usize)?));
+            let (normal, _) = self.normal(posed, v as usize)?;
+            let gap = dot(offset, normal);
+            if let Some(gate) = gate {
+                let aside = gate.tangential_edges * self.median_edge;
+                let tangential = crate::vec3::add_scaled(offset, -gap, normal);
+                if gap.abs() > gate.depth || norm_squared(tangential) > aside * aside {
+                    return None;
+                }
+            }
+            let excess = epsilon - gap;
+            if excess <= 0.0 {
+                return None;
+            }
+            Some(VertexContact { inner: v, energy: excess.powi(3), slope: -3.0 * excess * excess })
+        };
+        let points = outer.at.par_iter().with_min_len(GRAIN / 2);
+        let contacts: Vec<VertexContact> = points.map(|p| contact(p).unwrap_or(NO_CONTACT)).collect();
         if let Some([mut inner_target, mut outer_target]) = targets {
             // With f = x − x_g: ∂d/∂x = n, ∂d/∂x_g = −n, ∂d/∂N = (f − n (n·f))/√(|N|² + τ²).
             let mut by_normal = vec![zero(); inner.len()];
@@ -127,33 +141,6 @@ impl InnerVertices {
             self.pull_back_normals(inner, &by_normal, inner_target);
         }
         contacts.iter().map(|c| c.energy).sum()
-    }
-
-    #[inline(always)]
-    fn contact<T: Real>(
-        &self,
-        inner: &[[T; 3]],
-        posed: &PosedVertices<T>,
-        p: [T; 3],
-        epsilon: f64,
-        gate: Option<LayerGate>,
-    ) -> Option<VertexContact> {
-        let (v, _) = posed.index.nearest(p);
-        let offset = sub(to_f64(p), to_f64(*inner.get(v as usize)?));
-        let (normal, _) = self.normal(posed, v as usize)?;
-        let gap = dot(offset, normal);
-        if let Some(gate) = gate {
-            let aside = gate.tangential_edges * self.median_edge;
-            let tangential = crate::vec3::add_scaled(offset, -gap, normal);
-            if gap.abs() > gate.depth || norm_squared(tangential) > aside * aside {
-                return None;
-            }
-        }
-        let excess = epsilon - gap;
-        if excess <= 0.0 {
-            return None;
-        }
-        Some(VertexContact { inner: v, energy: excess.powi(3), slope: -3.0 * excess * excess })
     }
 
     /// Adds the gradient through `N` to the corners of the faces: a face with corners `a b c` adds `a×b + b×c + c×a` to `N`

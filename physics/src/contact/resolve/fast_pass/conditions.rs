@@ -153,7 +153,7 @@ impl FastPass<'_> {
     /// How far apart what is `height` apart (m) has to get: what is too near gets the gap, the rest only keeps from
     /// coming too near.
     fn wanted(&self, height: f64) -> f64 {
-        let least = self.settings.trigger * self.settings.gap;
+        let least = self.settings.least_gap();
         if height < least { self.settings.gap } else { least }
     }
 
@@ -227,14 +227,8 @@ impl FastPass<'_> {
             return None;
         }
         let (_, at) = along_line(p, normal, &[a, b, c])?;
-        let [v, rest @ ..] = pair.vertices;
-        self.contact(
-            [v, rest[0], rest[1], rest[2]],
-            [1.0, -at[0], -at[1], -at[2]],
-            up,
-            height,
-            away.is_none(),
-        )
+        let weights = [1.0, -at[0], -at[1], -at[2]];
+        self.contact(pair.vertices, weights, (up, height), away.is_none())
     }
 
     /// The first edge of `pair` over its second along `away`, or under it.
@@ -252,7 +246,7 @@ impl FastPass<'_> {
         let (up, height) = (scale(normal, side), side * height);
         (-self.deepest(pair)..NEAR_ELEMENTS)
             .contains(&height)
-            .then(|| self.contact(pair.vertices, weights, up, height, away.is_none()))
+            .then(|| self.contact(pair.vertices, weights, (up, height), away.is_none()))
             .flatten()
     }
 
@@ -268,8 +262,7 @@ impl FastPass<'_> {
         &self,
         vertices: [u32; 4],
         weights: [f64; 4],
-        normal: [f64; 3],
-        height: f64,
+        (normal, height): ([f64; 3], f64),
         keeps: bool,
     ) -> Option<Condition> {
         let cloth = self.input.len() as u32;
@@ -278,11 +271,7 @@ impl FastPass<'_> {
             weights: [0.0; 6],
             count: 0,
             normal,
-            target: if keeps {
-                height.min(self.settings.trigger * self.settings.gap)
-            } else {
-                self.wanted(height)
-            },
+            target: if keeps { height.min(self.settings.least_gap()) } else { self.wanted(height) },
         };
         for (v, w) in vertices.into_iter().zip(weights) {
             if v < cloth {

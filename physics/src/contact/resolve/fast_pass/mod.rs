@@ -6,7 +6,6 @@
 //! filter. The last ones are filtered, so that they make no new intersection. What parted triangles once is asked for
 //! in all later rounds. It ends when nothing intersects, or when rounds no longer help: the rest is left to relaxation.
 
-mod certificate;
 mod conditions;
 #[cfg(test)]
 mod tests;
@@ -15,6 +14,7 @@ use super::attempt::FEW_SELF_PAIRS;
 use super::budget::Budget;
 use super::certificate::Certificate;
 use super::condition::{Condition, Plane};
+use super::count::certified;
 use super::layer_constraint::outward;
 use super::obstacle::BodyObstacle;
 use super::packed_cloth::PackedCloth;
@@ -29,7 +29,7 @@ use rayon::prelude::*;
 /// Rings of neighbours around a defect that move along.
 const RINGS: usize = 2;
 /// Sweeps of the relaxation in a round.
-const SWEEPS: usize = 10;
+const FAST_SWEEPS: usize = 10;
 /// Rounds at most; stalling ends it long before.
 const ROUNDS: usize = 20;
 /// A round that leaves more than this share of the intersections hardly helps.
@@ -71,7 +71,7 @@ pub(super) fn fast_pass(drawn: &BodyObstacle<'_>, task: Task<'_>) -> Option<Reso
     }
     pass.relax_strain(task);
     let positions = outfit.split(&pass.positions);
-    let certificate = budget.certifying(|| pass.certificate(&positions));
+    let certificate = budget.certifying(|| certified(drawn, layers, &positions));
     let mut resolved = Resolved { positions, certificate, ..Resolved::default() };
     resolved.compare_since(layers, budget);
     resolved.garments.iter_mut().for_each(|work| work.rounds = rounds);
@@ -180,7 +180,7 @@ impl<'a> FastPass<'a> {
         let gap = SELF_GAP * self.settings.gap;
         contacts.extend(part_self_intersections(self.outfit, pairs, gap, &self.positions, (cloth, shape)).0);
         let (stretch, most) = (self.settings.stretch, self.settings.farthest);
-        relax(self.outfit, cloth, &self.shape, region, &contacts, stretch, (SWEEPS, LastPasses::FEW));
+        relax(self.outfit, cloth, &self.shape, region, &contacts, stretch, (FAST_SWEEPS, LastPasses::FEW));
         for &v in region {
             cloth[v as usize] = no_farther(self.input[v as usize], cloth[v as usize], most);
         }

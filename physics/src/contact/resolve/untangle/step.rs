@@ -7,6 +7,8 @@ use super::super::self_intersections::part_self_intersections;
 use super::UntanglingState;
 use crate::vec3::{add, add_scaled, dot, norm, sub};
 
+/// Sweeps of the relaxation in a round.
+const SWEEPS: usize = 20;
 /// Longest step that a condition asks for in a round (m).
 const LONGEST_ASKED_STEP: f64 = 0.02;
 
@@ -69,8 +71,7 @@ impl UntanglingState<'_> {
                 LastPasses::ALL
             }
         };
-        let (sweeps, stretch) = (self.settings.sweeps, self.stretch);
-        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, stretch, (sweeps, last));
+        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, self.stretch, (SWEEPS, last));
         for &v in &region {
             let v = v as usize;
             self.positions[v] = no_farther(self.input[v], self.positions[v], self.farthest);

@@ -3,7 +3,7 @@
 
 use super::super::InnerLayer;
 use super::*;
-use crate::energy::{ContactPoints, LayerContact};
+use crate::energy::{ContactPoints, LayerContact, LayerGate};
 use crate::mesh::shapes::{self, SplitMix};
 use crate::query::brute_force;
 use crate::vec3::norm;
