@@ -21,9 +21,8 @@ pub(crate) struct CellGrid<T> {
     /// The same points, one list per axis.
     pub(crate) axes: [Vec<T>; 3],
     per_radius: i64,
-    /// Key and first point of every occupied cell, ascending; the end of the last cell follows.
+    /// Key and first point of every occupied cell, ascending; a larger key and the end of the last cell follow.
     cells: Vec<(u64, u32)>,
-    end: u32,
 }
 
 /// Bits per axis of a cell key.
@@ -66,24 +65,21 @@ impl<T: Real> CellGrid<T> {
                 cells.push((key, k as u32));
             }
         }
+        cells.push((u64::MAX, keyed.len() as u32));
         let order: Vec<u32> = keyed.iter().map(|&(_, v)| v).collect();
         let points: Vec<[T; 3]> = order.iter().map(|&v| positions[v as usize]).collect();
         let axes = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect());
-        Self { order, points, axes, per_radius, cells, end: keyed.len() as u32 }
-    }
-
-    fn start(&self, cell: usize) -> usize {
-        self.cells.get(cell).map_or(self.end, |&(_, start)| start) as usize
+        Self { order, points, axes, per_radius, cells }
     }
 
     /// Number of occupied cells.
     pub(crate) fn cell_count(&self) -> usize {
-        self.cells.len()
+        self.cells.len() - 1
     }
 
     /// The sorted points of a cell.
     pub(crate) fn range(&self, cell: usize) -> std::ops::Range<usize> {
-        self.start(cell)..self.start(cell + 1)
+        self.cells[cell].1 as usize..self.cells[cell + 1].1 as usize
     }
 
     /// Calls `visit` with the points of the cells that come closer to `cell` than the radius, in order; a row of cells along x
@@ -103,7 +99,7 @@ impl<T: Real> CellGrid<T> {
                 let from = self.cells.partition_point(|&(k, _)| k < first);
                 let to = from + self.cells[from..].iter().take_while(|&&(k, _)| k <= last).count();
                 if from < to {
-                    visit(self.start(from)..self.start(to));
+                    visit(self.cells[from].1 as usize..self.cells[to].1 as usize);
                 }
             }
         }

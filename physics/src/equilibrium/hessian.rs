@@ -106,11 +106,6 @@ impl Hessian {
         Some(direction)
     }
 
-    /// Where block `(row, column)`, `row ≤ column`, is among those of its row.
-    fn place(&self, [row, column]: [u32; 2]) -> Option<usize> {
-        self.blocks.row(row as usize).binary_search(&column).ok()
-    }
-
     /// Adds to the block at a place.
     #[inline(always)]
     fn add(&mut self, [row, column]: [u32; 2], place: usize, block: [[f64; 3]; 3]) {
@@ -144,10 +139,9 @@ impl CurvatureSink for Blocks<'_> {
         if i == j {
             return self.hessian.add(pair, 0, block);
         }
-        let place = self.hessian.place(pair);
-        match place {
-            Some(place) => self.hessian.add(pair, place, block),
-            None => self.missing.push(pair),
+        match self.hessian.blocks.row(pair[0] as usize).binary_search(&pair[1]) {
+            Ok(place) => self.hessian.add(pair, place, block),
+            Err(_) => self.missing.push(pair),
         }
     }
 }

@@ -42,31 +42,27 @@ pub struct Eigenbasis {
 /// # Errors
 /// [`OperatorError::Factorisation`] or [`OperatorError::NotConverged`], naming the component.
 pub fn eigenbasis(laplacian: &SparseMatrix, mass: &[f64], count: usize) -> Result<Eigenbasis, OperatorError> {
-    struct Pair {
-        value: f64,
-        component: usize,
-        column: usize,
-    }
     let components = members(laplacian, mass);
-    let mut pairs = Vec::new();
+    // Eigenvalue, component, column in its basis.
+    let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
     let mut bases = Vec::with_capacity(components.len());
     for vertices in &components {
         let (values, vectors) = component_basis(laplacian, mass, vertices, count)?;
         let component = bases.len();
-        pairs.extend(values.iter().enumerate().map(|(column, &value)| Pair { value, component, column }));
+        pairs.extend(values.iter().enumerate().map(|(column, &value)| (value, component, column)));
         bases.push(vectors);
     }
-    pairs.sort_by(|a, b| a.value.total_cmp(&b.value));
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     pairs.truncate(count);
 
     let mut values = vec![0.0; count];
     let mut vectors = vec![0.0; mass.len() * count];
-    for (target, pair) in pairs.iter().enumerate() {
-        values[target] = pair.value;
-        let basis = &bases[pair.component];
-        let sign = sign(basis.col_as_slice(pair.column));
-        for (row, &vertex) in components[pair.component].iter().enumerate() {
-            vectors[vertex as usize * count + target] = sign * basis[(row, pair.column)];
+    for (target, &(value, component, column)) in pairs.iter().enumerate() {
+        values[target] = value;
+        let basis = &bases[component];
+        let sign = sign(basis.col_as_slice(column));
+        for (row, &vertex) in components[component].iter().enumerate() {
+            vectors[vertex as usize * count + target] = sign * basis[(row, column)];
         }
     }
     Ok(Eigenbasis { values, vectors })

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::condition::{along_line, normal_of};
 use super::obstacle::{BodyObstacle, touching};
-use crate::contact::{Triangle, TriangleTree};
+use crate::contact::Triangle;
 use crate::query::{FaceSide, Surface};
 use crate::vec3::{add_scaled, bounds, dot};
 
@@ -122,7 +122,7 @@ impl<'a> BodyObstacle<'a> {
 /// How far every vertex steps back, against its normal (m); only those `near` cloth and around them do. Also the corners of
 /// faces inside another part, or intersecting one. `None` without an inside.
 fn steps(drawn: &BodyObstacle<'_>, clearance: f64, is_deep: bool) -> Option<(Vec<f64>, Vec<bool>)> {
-    let BodyObstacle { surface, near, tree, .. } = drawn;
+    let BodyObstacle { surface, near, .. } = drawn;
     let (positions, faces, union) = (&surface.positions, &surface.faces, drawn.union.as_ref()?);
     // Whether all, or some, of the faces at a vertex are inside another part.
     let (mut all_inside, mut some_inside) = (vec![true; positions.len()], vec![false; positions.len()]);
@@ -139,11 +139,11 @@ fn steps(drawn: &BodyObstacle<'_>, clearance: f64, is_deep: bool) -> Option<(Vec
         let (p, n) = (positions[v], surface.normals[v]);
         let is_inside =
             all_inside[v] || some_inside[v] && union.winding_number(add_scaled(p, VERTEX_LOOK_OUT, n)) >= 1;
+        let (deepest, v) = (DEEPEST_PART, v as u32);
         let apart = match is_inside {
-            true => facing_surface(tree, faces, v as u32, -DEEPEST_PART, p, n).or_else(|| {
-                is_deep.then(|| -nearest_facing(tree, faces, v as u32, p, n).unwrap_or(DEEPEST_PART))
-            }),
-            false => facing_surface(tree, faces, v as u32, clearance, p, n),
+            true => facing_surface(drawn, v, -deepest)
+                .or_else(|| is_deep.then(|| -nearest_facing(drawn, v).unwrap_or(deepest))),
+            false => facing_surface(drawn, v, clearance),
         };
         apart.map_or(0.0, |apart| (0.5 * (clearance - apart)).clamp(0.0, LONGEST_YIELD))
     };
@@ -158,17 +158,11 @@ fn steps(drawn: &BodyObstacle<'_>, clearance: f64, is_deep: bool) -> Option<(Vec
     Some((steps, some_inside))
 }
 
-/// How far along `n` from vertex `v` at `p` a surface faces it, at most `reach` (backwards where that is negative).
-fn facing_surface(
-    tree: &TriangleTree<'_>,
-    faces: &[[u32; 3]],
-    v: u32,
-    reach: f64,
-    p: [f64; 3],
-    n: [f64; 3],
-) -> Option<f64> {
+/// How far from vertex `v` along its normal a surface faces it, at most `reach` (backwards where that is negative).
+fn facing_surface(BodyObstacle { surface, tree, .. }: &BodyObstacle<'_>, v: u32, reach: f64) -> Option<f64> {
+    let (p, n) = (surface.positions[v as usize], surface.normals[v as usize]);
     let faces_it = |f: u32| {
-        if faces[f as usize].contains(&v) {
+        if surface.faces[f as usize].contains(&v) {
             return None;
         }
         let triangle = tree.triangle(f)?;
@@ -180,18 +174,14 @@ fn facing_surface(
     along.filter_map(faces_it).min_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
-/// How far from vertex `v` at `p`, inside another part, the nearest surface is that does not face the way of `n`: for a vertex
+/// How far from vertex `v`, inside another part, the nearest surface is that does not face the way of its normal: for a vertex
 /// that has just gone in at a slant, and has no surface straight behind it.
-fn nearest_facing(
-    tree: &TriangleTree<'_>,
-    faces: &[[u32; 3]],
-    v: u32,
-    p: [f64; 3],
-    n: [f64; 3],
-) -> Option<f64> {
-    let looks_elsewhere =
-        |f: u32, triangle: &Triangle| !faces[f as usize].contains(&v) && dot(normal_of(triangle), n) < 0.0;
-    tree.nearest(p, DEEPEST_PART, looks_elsewhere)
+fn nearest_facing(BodyObstacle { surface, tree, .. }: &BodyObstacle<'_>, v: u32) -> Option<f64> {
+    let n = surface.normals[v as usize];
+    let looks_elsewhere = |f: u32, triangle: &Triangle| {
+        !surface.faces[f as usize].contains(&v) && dot(normal_of(triangle), n) < 0.0
+    };
+    tree.nearest(surface.positions[v as usize], DEEPEST_PART, looks_elsewhere)
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! Linear conditions on a garment's vertices, and where two triangles that intersect ask for them.
 
 use crate::contact::Triangle;
-use crate::query::SurfacePoint;
 use crate::vec3::{add_scaled, axpy, cross, dot, norm_squared, normalized, sub};
 
 /// The half-space that the surface nearest to a point leaves to it: `normal·x ≥ offset`.
@@ -15,18 +14,6 @@ pub(super) struct Plane {
     pub distance: f64,
     /// Whether it may be violated without being a defect: it only keeps what is there.
     pub is_held: bool,
-}
-
-impl Plane {
-    pub fn at(found: &SurfacePoint, normal: [f64; 3], distance: f64, is_held: bool) -> Self {
-        let offset = dot(normal, found.position);
-        Self { normal, offset, distance, is_held }
-    }
-
-    /// Signed distance of the point that asked (m), and the direction away from the obstacle.
-    pub fn seen(&self) -> (f64, [f64; 3]) {
-        (self.distance, self.normal)
-    }
 }
 
 /// `Σ weight·(vertex·normal) ≥ target` over up to six vertices.

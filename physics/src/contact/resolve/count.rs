@@ -59,7 +59,7 @@ impl ReportBody for BodyObstacle<'_> {
     }
 
     fn distance(&self, p: [f64; 3]) -> Option<(f64, [f64; 3])> {
-        self.look(p)?.plane.map(|plane| plane.seen())
+        self.look(p)?.plane.map(|plane| (plane.distance, plane.normal))
     }
 
     fn is_pinched(&self, face: u32) -> bool {

@@ -120,7 +120,8 @@ impl<'a> BodyObstacle<'a> {
         let plane = if is_inside && (is_pinched || self.is_pinch(p)) {
             None
         } else {
-            Some(Plane::at(&found, direction, distance, is_pinched))
+            let offset = dot(direction, found.position);
+            Some(Plane { normal: direction, offset, distance, is_held: is_pinched })
         };
         Some(BodyView { far, plane })
     }
