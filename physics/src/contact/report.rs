@@ -24,6 +24,17 @@ pub trait ReportBody: Sync {
     /// Signed distance of a point to it (m), and the direction away from it; `None` where it is not to be counted.
     fn distance(&self, p: [f64; 3]) -> Option<(f64, [f64; 3])>;
 
+    /// [`distance`](Self::distance) of all vertices of a garment, given by its number.
+    fn distances(&self, _garment: usize, positions: &[[f64; 3]]) -> Vec<Option<(f64, [f64; 3])>> {
+        positions.par_iter().with_min_len(128).map(|p| self.distance(*p)).collect()
+    }
+
+    /// The intersecting pairs of a garment, as [`TriangleTree`] finds them, if they are known: with another one under it, or with
+    /// itself, given by its number, or with the body.
+    fn known_pairs(&self, _garment: usize, _with: Option<usize>) -> Option<Vec<(u32, u32)>> {
+        None
+    }
+
     /// Whether pairs with this face of it are pinched: no cloth could avoid them.
     fn is_pinched(&self, _face: u32) -> bool {
         false
@@ -192,7 +203,7 @@ impl Report {
     /// Counts what is selected of `garments`, inner to outer, on `body`. The same for any number of threads.
     pub fn count(body: &impl ReportBody, garments: &[ReportGarment<'_>], selection: &Selection<'_>) -> Self {
         let counted: Vec<CountedGarment<'_>> =
-            garments.iter().map(|garment| CountedGarment::new(*garment, body)).collect();
+            garments.iter().enumerate().map(|(g, garment)| CountedGarment::new(g, *garment, body)).collect();
         let is_inner = |g: usize| selection.layers.iter().any(|(inner, _)| *inner == g);
         let surfaces: Vec<Option<InnerSurface<'_>>> = match selection.order {
             LayerOrder::NearestVertex => counted.iter().map(|_| None).collect(),
@@ -252,18 +263,18 @@ impl Report {
 
 /// A garment that is being counted.
 struct CountedGarment<'a> {
+    number: usize,
     garment: ReportGarment<'a>,
     /// Made where triangles are asked for.
     tree: OnceCell<TriangleTree<'a>>,
-    /// [`ReportBody::distance`] of every vertex.
+    /// [`ReportBody::distances`].
     distances: Vec<Option<(f64, [f64; 3])>>,
 }
 
 impl<'a> CountedGarment<'a> {
-    fn new(garment: ReportGarment<'a>, body: &impl ReportBody) -> Self {
-        let positions = garment.positions.par_iter().with_min_len(128);
-        let distances = positions.map(|p| body.distance(*p)).collect();
-        Self { garment, tree: OnceCell::new(), distances }
+    fn new(number: usize, garment: ReportGarment<'a>, body: &impl ReportBody) -> Self {
+        let distances = body.distances(number, garment.positions);
+        Self { number, garment, tree: OnceCell::new(), distances }
     }
 
     fn tree(&self) -> &TriangleTree<'a> {
@@ -277,13 +288,15 @@ impl<'a> CountedGarment<'a> {
             ..GarmentReport::default()
         };
         if with_triangles {
+            let known = body.known_pairs(self.number, None);
             report.with_body = TrianglePairs::new(
-                self.tree().pairs_with(body.tree()),
+                known.unwrap_or_else(|| self.tree().pairs_with(body.tree())),
                 |(_, b)| body.is_pinched(*b),
                 |pairs| contours(self.tree(), body.tree(), pairs),
             );
+            let known = body.known_pairs(self.number, Some(self.number));
             report.with_itself = TrianglePairs::new(
-                self.tree().self_pairs(),
+                known.unwrap_or_else(|| self.tree().self_pairs()),
                 |(f, g)| self.is_pinched(body, *f) && self.is_pinched(body, *g),
                 |pairs| self_contours(self.tree(), pairs),
             );
@@ -293,8 +306,9 @@ impl<'a> CountedGarment<'a> {
 
     /// Pairs with a garment under it.
     fn pairs_with(&self, under: &Self, body: &impl ReportBody) -> TrianglePairs {
+        let known = body.known_pairs(self.number, Some(under.number));
         TrianglePairs::new(
-            self.tree().pairs_with(under.tree()),
+            known.unwrap_or_else(|| self.tree().pairs_with(under.tree())),
             |(f, g)| self.is_pinched(body, *f) && under.is_pinched(body, *g),
             |pairs| contours(self.tree(), under.tree(), pairs),
         )

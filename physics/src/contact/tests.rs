@@ -239,3 +239,31 @@ fn threads_change_nothing() {
     });
     assert_eq!(one, many);
 }
+
+/// A tree that is kept while the mesh moves finds what a new one finds, also when faces lose their area or get one.
+#[test]
+fn a_refitted_tree_finds_the_same_pairs() {
+    let mesh = irregular_grid(0.5, 0.5, 12, 12, 0.25, 4);
+    let ball = icosphere(0.15, 3);
+    let ball = TriangleTree::new(ball.positions(), ball.faces());
+    let mut random = SplitMix::new(5);
+    let (mut positions, faces) = (mesh.positions().to_vec(), mesh.faces());
+    let mut kept = TriangleTree::new(&positions, faces).into_kept();
+    let mut found = 0;
+    for round in 0..12 {
+        let size = 0.02 * f64::from(round);
+        positions.iter_mut().flatten().for_each(|x| *x += size * random.symmetric());
+        if round % 4 == 2 {
+            let [a, b, _] = faces[7];
+            positions[a as usize] = positions[b as usize];
+        }
+        let (fresh, refitted) =
+            (TriangleTree::new(&positions, faces), TriangleTree::refitted(kept, &positions, faces));
+        assert_eq!(refitted.skipped(), fresh.skipped());
+        assert_eq!(refitted.self_pairs(), fresh.self_pairs());
+        assert_eq!(refitted.pairs_with(&ball), fresh.pairs_with(&ball));
+        found += fresh.self_pairs().len().min(fresh.pairs_with(&ball).len());
+        kept = refitted.into_kept();
+    }
+    assert!(found > 100, "{found}");
+}

@@ -3,7 +3,7 @@
 
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::math::Vector;
-use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode, BvhWorkspace};
 use rayon::prelude::*;
 
 use super::triangle_pair::{Triangle, corners, has_area, mesh_triangles_intersect, triangles_intersect};
@@ -19,6 +19,13 @@ pub struct TriangleTree<'a> {
     faces: &'a [[u32; 3]],
     bvh: Bvh,
     /// Leaf of the tree → face.
+    kept: Vec<u32>,
+}
+
+/// The tree of a [`TriangleTree`] without the mesh, to be kept while that moves.
+#[derive(Default)]
+pub(crate) struct KeptTree {
+    bvh: Bvh,
     kept: Vec<u32>,
 }
 
@@ -39,6 +46,26 @@ impl<'a> TriangleTree<'a> {
             .filter(|(face, bounds)| is_part(*face, bounds))
             .unzip();
         Self { positions, faces, bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes), kept }
+    }
+
+    /// As [`new`](Self::new), with the tree of the same faces elsewhere, whose boxes are fitted anew in O(F): for meshes that are
+    /// still in about the same shape. Pairs are the same.
+    pub(crate) fn refitted(tree: KeptTree, positions: &'a [[f64; 3]], faces: &'a [[u32; 3]]) -> Self {
+        let KeptTree { mut bvh, kept } = tree;
+        let boxes = triangle_boxes(positions, faces);
+        if !boxes.iter().map(|(face, _)| face).eq(&kept) {
+            return Self::new(positions, faces);
+        }
+        for (leaf, (_, bounds)) in (0..).zip(boxes) {
+            bvh.insert_or_update_partially(bounds, leaf, 0.0);
+        }
+        bvh.refit_without_opt();
+        Self { positions, faces, bvh, kept }
+    }
+
+    /// The tree alone, for [`refitted`](Self::refitted).
+    pub(crate) fn into_kept(self) -> KeptTree {
+        KeptTree { bvh: self.bvh, kept: self.kept }
     }
 
     /// Positions of the mesh, `[V, 3]` (m).
@@ -69,7 +96,16 @@ impl<'a> TriangleTree<'a> {
     /// Pairs (face of `self`, face of `other`) that share a point, in ascending order. The meshes are taken for strangers:
     /// equal indices mean nothing.
     pub fn pairs_with(&self, other: &TriangleTree) -> Vec<(u32, u32)> {
-        other.pairs_of_faces(self.positions, self.faces, &self.kept, |_| true)
+        if self.bvh.is_empty() || other.bvh.is_empty() {
+            return Vec::new();
+        }
+        let candidates = self
+            .bvh
+            .leaf_pairs(&other.bvh, |a, b| a.intersects(b))
+            .map(|(a, b)| (self.kept[a as usize], other.kept[b as usize]));
+        decided(candidates.collect(), |(a, b)| {
+            self.triangle(a).zip(other.triangle(b)).is_some_and(|(a, b)| triangles_intersect(&a, &b))
+        })
     }
 
     /// Pairs (face of another mesh, face of this one that is `asked` for) that share a point, for some `faces` of the other mesh
@@ -98,7 +134,12 @@ impl<'a> TriangleTree<'a> {
     /// Pairs of different faces of this mesh, smaller index first, that intersect beyond the vertices they share (see
     /// [`mesh_triangles_intersect`]), in ascending order.
     pub fn self_pairs(&self) -> Vec<(u32, u32)> {
-        self.self_pairs_of_faces(&self.kept)
+        let mut candidates = Vec::new();
+        self.bvh.traverse_bvtt_single_tree::<false>(&mut BvhWorkspace::default(), &mut |a, b| {
+            let (a, b) = (self.kept[a as usize], self.kept[b as usize]);
+            candidates.push((a.min(b), a.max(b)));
+        });
+        decided(candidates, |(a, b)| mesh_triangles_intersect(self.positions, self.face(a), self.face(b)))
     }
 
     /// Those of [`self_pairs`](Self::self_pairs) in which one of `faces` takes part.
@@ -206,6 +247,14 @@ fn sorted_pairs<I: Iterator<Item = (u32, u32)>>(
 ) -> Vec<(u32, u32)> {
     let mut pairs: Vec<(u32, u32)> =
         faces.par_iter().with_min_len(256).flat_map_iter(|&f| found(f)).collect();
+    pairs.sort_unstable();
+    pairs
+}
+
+/// Those of `candidates` that `intersect`, in ascending order.
+fn decided(candidates: Vec<(u32, u32)>, intersect: impl Fn((u32, u32)) -> bool + Sync) -> Vec<(u32, u32)> {
+    let mut pairs: Vec<(u32, u32)> =
+        candidates.into_par_iter().with_min_len(1024).filter(|&pair| intersect(pair)).collect();
     pairs.sort_unstable();
     pairs
 }

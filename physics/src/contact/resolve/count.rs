@@ -24,7 +24,7 @@ pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate,
 }
 
 /// [`certify`] for valid arguments.
-fn certified_around(body: &Surface<f64>, layers: &[Layer<'_>]) -> Certificate {
+pub(super) fn certified_around(body: &Surface<f64>, layers: &[Layer<'_>]) -> Certificate {
     let drawn = BodyObstacle::near_layers(body, layers);
     let mut found = certificate(&drawn, layers);
     if found.body_triangle_pairs > 0 {
@@ -36,6 +36,13 @@ fn certified_around(body: &Surface<f64>, layers: &[Layer<'_>]) -> Certificate {
 
 /// [`certified_around`] near a `body` that is prepared; its yield is as it was noted.
 fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Certificate {
+    let mut found = counted(body, layers);
+    found.count_narrow(body);
+    found
+}
+
+/// [`certificate`] without what depends on where the body yields; `body` may know some of what is to be counted.
+pub(super) fn counted(body: &impl ReportBody, layers: &[Layer<'_>]) -> Certificate {
     let garments: Vec<ReportGarment<'_>> = layers
         .iter()
         .map(|layer| ReportGarment { positions: layer.positions, faces: &layer.garment.faces })
@@ -48,9 +55,7 @@ fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Certificate {
         body_itself: false,
     };
     let strains = layers.iter().map(|layer| layer.garment.strain_energy(layer.positions));
-    let mut found = Certificate::new(&Report::count(body, &garments, &selection), strains);
-    found.count_narrow(body);
-    found
+    Certificate::new(&Report::count(body, &garments, &selection), strains)
 }
 
 impl ReportBody for BodyObstacle<'_> {
@@ -85,7 +90,7 @@ pub(super) fn certified(
 }
 
 /// Whether nothing moved so far from `layers` that it could meet more of the body than what is near those.
-fn is_near(layers: &[Layer<'_>], positions: &[Vec<[f64; 3]>]) -> bool {
+pub(super) fn is_near(layers: &[Layer<'_>], positions: &[Vec<[f64; 3]>]) -> bool {
     let is_near = |(p, q): (&[f64; 3], &[f64; 3])| vec3::norm(vec3::sub(*q, *p)) <= NEAR_MARGIN;
     layers.iter().zip(positions).all(|(layer, moved)| layer.positions.iter().zip(moved).all(is_near))
 }

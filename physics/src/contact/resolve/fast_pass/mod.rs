@@ -6,6 +6,7 @@
 //! filter. The last ones are filtered, so that they make no new intersection. What parted triangles once is asked for
 //! in all later rounds. It ends when nothing intersects, or when rounds no longer help: the rest is left to relaxation.
 
+mod certificate;
 mod conditions;
 #[cfg(test)]
 mod tests;
@@ -14,7 +15,6 @@ use super::attempt::FEW_SELF_PAIRS;
 use super::budget::Budget;
 use super::certificate::Certificate;
 use super::condition::{Condition, Plane};
-use super::count::certified;
 use super::layer_constraint::outward;
 use super::obstacle::BodyObstacle;
 use super::packed_cloth::PackedCloth;
@@ -71,7 +71,7 @@ pub(super) fn fast_pass(drawn: &BodyObstacle<'_>, task: Task<'_>) -> Option<Reso
     }
     pass.relax_strain(task);
     let positions = outfit.split(&pass.positions);
-    let certificate = budget.certifying(|| certified(drawn, layers, &positions));
+    let certificate = budget.certifying(|| pass.certificate(&positions));
     let mut resolved = Resolved { positions, certificate, ..Resolved::default() };
     resolved.compare_since(layers, budget);
     resolved.garments.iter_mut().for_each(|work| work.rounds = rounds);

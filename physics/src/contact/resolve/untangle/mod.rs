@@ -15,7 +15,7 @@ use super::obstacle::BodyObstacle;
 use super::packed_cloth::PackedCloth;
 use super::task::Task;
 use crate::contact::ORDER_RADIUS;
-use crate::query::triangle_tree::{TriangleTree, self_triangle_pairs};
+use crate::query::triangle_tree::{KeptTree, TriangleTree, self_triangle_pairs};
 
 /// A vertex nearer to a half-space than this (m) is kept out of it: smoothing may carry it there.
 const WATCHED: f64 = 0.01;
@@ -48,6 +48,8 @@ pub(super) struct UntanglingState<'a> {
     /// Outward directions; zero where there is none.
     outward: Vec<[f64; 3]>,
     over: Vec<LayerConstraint>,
+    /// Trees of the garments at their last positions.
+    trees: Vec<KeptTree>,
     intersections: IntersectingPairs,
     /// Intersections of the input's garments with themselves, ascending.
     known_self_intersections: Vec<(u32, u32)>,
@@ -98,6 +100,7 @@ impl<'a> UntanglingState<'a> {
             planes: vec![None; count],
             outward: vec![[0.0; 3]; count],
             over: Vec::new(),
+            trees: (0..outfit.len()).map(|_| KeptTree::default()).collect(),
             intersections: IntersectingPairs::new(outfit.faces.len()),
             known_self_intersections: Vec::new(),
             remembered: Vec::new(),
@@ -190,8 +193,13 @@ impl<'a> UntanglingState<'a> {
     /// Brings intersections and the order of layers up to date.
     fn detect(&mut self) {
         let (outfit, positions) = (self.outfit, &self.positions);
-        let tree = |g: usize| TriangleTree::new(outfit.part(positions, g), &outfit.layers[g].garment.faces);
-        let trees: Vec<TriangleTree<'_>> = (0..outfit.len()).into_par_iter().map(tree).collect();
+        let trees: Vec<TriangleTree<'_>> = std::mem::take(&mut self.trees)
+            .into_par_iter()
+            .enumerate()
+            .map(|(g, tree)| {
+                TriangleTree::refitted(tree, outfit.part(positions, g), &outfit.layers[g].garment.faces)
+            })
+            .collect();
         let reach = (ORDER_RADIUS, self.watch());
         if self.orientation.is_none() {
             self.over = layer_constraints(outfit, &trees, positions, &self.outward, reach);
@@ -199,6 +207,7 @@ impl<'a> UntanglingState<'a> {
         // Pinched pairs count with contact orientation: they would have none in the next step.
         let counted = (self.settings.self_contact, self.orientation.is_some());
         self.intersections.update(outfit, self.body, &trees, positions, &self.far, counted);
+        self.trees = trees.into_iter().map(TriangleTree::into_kept).collect();
     }
 
     /// Updates what the body leaves to vertices that moved, and marks the faces around them.
