@@ -39,14 +39,12 @@ impl ReportBody for FastPass<'_> {
         // The inner garment comes first in the pairs of the filter, the body last.
         let is_self_pair = with == Some(garment);
         let local = |&(f, g): &(u32, u32)| match with {
-            None => (of(f) == Some(garment))
-                .then_some(())
-                .and_then(|()| Some((f - first(garment), self.body_face(g)?))),
+            None if of(f) == Some(garment) => Some((f - first(garment), self.body_face(g)?)),
             Some(inner) if of(f) == Some(inner) && of(g) == Some(garment) => {
                 let (f, g) = (f - first(inner), g - first(garment));
                 Some(if is_self_pair { (f, g) } else { (g, f) })
             }
-            Some(_) => None,
+            _ => None,
         };
         let mut pairs: Vec<(u32, u32)> = self.filter.intersections.iter().filter_map(local).collect();
         pairs.sort_unstable();
