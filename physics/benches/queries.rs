@@ -1,27 +1,23 @@
-//! Times of the queries beside exhaustive search.
+//! Times of the queries.
 //!
 //! `cargo bench -p clothcombo-physics --bench queries [-- FILTER]`. Every time is that of one query per garment vertex, on one
-//! thread; exhaustive search is left out where it would take minutes.
+//! thread.
 
 mod scenes;
 
 use std::hint::black_box;
 use std::time::Duration;
 
-use clothcombo_physics::contact::{triangle_pairs, triangles_intersect};
-use clothcombo_physics::query::{Distance, brute_force};
+use clothcombo_physics::contact::triangle_pairs;
+use clothcombo_physics::query::Distance;
 use clothcombo_physics::{Surface, TriMesh};
 use criterion::{BenchmarkId, Criterion};
 use scenes::Growth;
-
-/// Garments up to this size are searched exhaustively as well.
-const EXHAUSTIVE: usize = 2_000;
 
 fn bench(criterion: &mut Criterion, body: &TriMesh, size: usize) {
     let dressed = scenes::garment(size, Growth::FixedArea, 0.0);
     let narrow = scenes::narrowed(&dressed.posed);
     let surface = Surface::<f32>::from_mesh(body);
-    let exhaustive = size <= EXHAUSTIVE;
     let mut group = criterion.benchmark_group("queries");
     group.sample_size(10).measurement_time(Duration::from_secs(1)).warm_up_time(Duration::from_millis(200));
 
@@ -36,30 +32,6 @@ fn bench(criterion: &mut Criterion, body: &TriMesh, size: usize) {
     group.bench_function(BenchmarkId::new("intersecting triangle pairs", size), |bencher| {
         bencher.iter(|| triangle_pairs(&dressed.posed, dressed.rest.faces(), body.positions(), body.faces()));
     });
-    if exhaustive {
-        group.bench_function(BenchmarkId::new("nearest vertex, exhaustive", size), |bencher| {
-            bencher
-                .iter(|| narrow.iter().map(|p| brute_force::nearest(&surface.positions, *p).1).sum::<f32>());
-        });
-        group.bench_function(BenchmarkId::new("closest point, exhaustive", size), |bencher| {
-            let distance =
-                |p: &[f64; 3]| brute_force::distance_to_surface(body.positions(), body.faces(), *p);
-            bencher.iter(|| dressed.posed.iter().map(distance).sum::<f64>());
-        });
-        group.bench_function(BenchmarkId::new("intersecting triangle pairs, exhaustive", size), |bencher| {
-            let corners = |mesh: &[[f64; 3]], face: [u32; 3]| face.map(|v| mesh[v as usize]);
-            bencher.iter(|| {
-                let mut count = 0;
-                for &a in dressed.rest.faces() {
-                    let a = corners(&dressed.posed, a);
-                    for &b in body.faces() {
-                        count += usize::from(triangles_intersect(&a, &corners(body.positions(), b)));
-                    }
-                }
-                count
-            });
-        });
-    }
     group.finish();
 }
 

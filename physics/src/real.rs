@@ -10,44 +10,17 @@ use num_traits::{Float, FloatConst, NumAssign};
 ///
 /// Everything numerical in this crate that is evaluated in both precisions is written once over this trait.
 pub trait Real:
-    Float + FloatConst + NumAssign + Sum + Default + Debug + Display + Send + Sync + KdScalar + 'static
+    Float + FloatConst + NumAssign + Sum + Default + Debug + Display + Send + Sync + 'static
 {
+    /// The kd-tree over points of this scalar. Use it through [`crate::VertexIndex`].
+    #[doc(hidden)]
+    type Tree: Debug + Send + Sync;
+
     /// Rounds an `f64` to this type.
     fn from_f64(value: f64) -> Self;
 
     /// Widens to `f64` (exact).
     fn to_f64(self) -> f64;
-}
-
-impl Real for f32 {
-    #[inline(always)]
-    fn from_f64(value: f64) -> Self {
-        value as f32
-    }
-
-    #[inline(always)]
-    fn to_f64(self) -> f64 {
-        f64::from(self)
-    }
-}
-
-impl Real for f64 {
-    #[inline(always)]
-    fn from_f64(value: f64) -> Self {
-        value
-    }
-
-    #[inline(always)]
-    fn to_f64(self) -> f64 {
-        self
-    }
-}
-
-/// Scalars for which there is a kd-tree: `f32` and `f64`. Use it through [`crate::VertexIndex`].
-pub trait KdScalar: Sized {
-    /// The tree over points of this scalar.
-    #[doc(hidden)]
-    type Tree: Debug + Send + Sync;
 
     /// Builds the tree; `None` for no points. Item `i` is the position in `points`, which must be finite.
     #[doc(hidden)]
@@ -62,10 +35,20 @@ pub trait KdScalar: Sized {
     fn visit_within(tree: &Self::Tree, point: [Self; 3], radius_squared: Self, visit: impl FnMut(u32));
 }
 
-macro_rules! impl_kd_scalar {
+macro_rules! impl_real {
     ($scalar:ty) => {
-        impl KdScalar for $scalar {
+        impl Real for $scalar {
             type Tree = ImmutableKdTree<$scalar, 3>;
+
+            #[inline(always)]
+            fn from_f64(value: f64) -> Self {
+                value as Self
+            }
+
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
 
             fn build_tree(points: &[[Self; 3]]) -> Option<Self::Tree> {
                 // The one error of an immutable tree is more points than `u32` can number, which no mesh has.
@@ -92,5 +75,5 @@ macro_rules! impl_kd_scalar {
     };
 }
 
-impl_kd_scalar!(f32);
-impl_kd_scalar!(f64);
+impl_real!(f32);
+impl_real!(f64);

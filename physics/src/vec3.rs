@@ -92,6 +92,19 @@ pub fn normalized<T: Real>(a: [T; 3]) -> [T; 3] {
     }
 }
 
+/// Smallest and largest coordinates of points; `(∞, −∞)` for none.
+#[inline(always)]
+pub fn bounds(points: impl IntoIterator<Item = [f64; 3]>) -> ([f64; 3], [f64; 3]) {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for p in points {
+        for k in 0..3 {
+            low[k] = low[k].min(p[k]);
+            high[k] = high[k].max(p[k]);
+        }
+    }
+    (low, high)
+}
+
 /// Whether all three coordinates are finite.
 #[inline(always)]
 pub fn is_finite<T: Real>(a: [T; 3]) -> bool {

@@ -3,7 +3,7 @@
 use crate::arrays::{MeshInput, from_json, moved, rows, to_value};
 use crate::call::{call, refused, refused_text};
 use clothcombo_data::asset::GarmentMaterial;
-use clothcombo_physics::contact::resolve::FARTHEST;
+use clothcombo_physics::contact::resolve::FARTHEST_POSITION;
 use clothcombo_physics::energy::{
     EnergyError, EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers, SceneValue, Term,
     TermMap,
@@ -304,7 +304,7 @@ impl Scene {
                 )));
             }
             // Within a kilometre, as the post-process asks; what is not a number fails as well.
-            let is_near = |p: &[T; 3]| p.iter().all(|x| Real::to_f64(*x).abs() <= FARTHEST);
+            let is_near = |p: &[T; 3]| p.iter().all(|x| Real::to_f64(*x).abs() <= FARTHEST_POSITION);
             if let Some(vertex) = positions.iter().position(|p| !is_near(p)) {
                 let place = positions[vertex].map(Real::to_f64);
                 return Err(Report::msg(format!(

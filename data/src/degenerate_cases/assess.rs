@@ -5,7 +5,7 @@ use super::scene::{CaseError, CaseScene};
 use super::suite::DegenerateCases;
 use clothcombo_physics::energy::gradient_bound::gradient_bound;
 use clothcombo_physics::energy::gradient_check::{
-    GradientCheck, TOLERANCE, check_gradient, largest_entry, raw_value, with_only,
+    GRADIENT_TOLERANCE, GradientCheck, check_gradient, largest_entry, raw_value, with_only,
 };
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, Term, TermMap};
 use clothcombo_physics::{Real, TriMesh};
@@ -74,7 +74,7 @@ impl TermReport {
                 self.largest_gradient, self.gradient_bound
             ));
         }
-        if !within(self.gradient_error, TOLERANCE) {
+        if !within(self.gradient_error, GRADIENT_TOLERANCE) {
             return Some(format!("gradient off its difference quotients by {:.1e}", self.gradient_error));
         }
         if !within(self.f32_relative(), SINGLE_PRECISION) && !self.cancels() {

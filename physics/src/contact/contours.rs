@@ -13,8 +13,6 @@ use crate::vec3;
 /// One curve of intersection.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contour {
-    /// Its points in order (m); a closed contour does not repeat the first.
-    pub points: Vec<[f64; 3]>,
     /// Whether the last point joins the first.
     pub closed: bool,
     /// Length of all its segments (m).
@@ -112,11 +110,8 @@ fn chain(points: &[[f64; 3]], segments: &[[usize; 2]]) -> Vec<Contour> {
             };
         }
         if numbers.len() > 1 {
-            let curve: Vec<[f64; 3]> = numbers.iter().map(|&p| points[p]).collect();
-            let length = curve.windows(2).map(|ends| vec3::distance_squared(ends[0], ends[1]).sqrt()).sum();
-            let closed = at == start;
-            let kept = curve.len() - usize::from(closed);
-            contours.push(Contour { points: curve[..kept].to_vec(), closed, length });
+            let step = |ends: &[usize]| vec3::distance_squared(points[ends[0]], points[ends[1]]).sqrt();
+            contours.push(Contour { closed: at == start, length: numbers.windows(2).map(step).sum() });
         }
     };
     let ends = (0..points.len()).filter(|&p| at_point[p].len() != 2);

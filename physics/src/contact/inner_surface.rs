@@ -3,7 +3,7 @@
 use crate::mesh::{Topology, vertex_normals};
 use crate::query::ClosestPoint;
 use crate::query::triangle_tree::TriangleTree;
-use crate::vec3::{add_scaled, dot, norm, scale, sub};
+use crate::vec3::{add_scaled, bounds, dot, norm, scale, sub};
 
 /// Components and border of a garment: what its order against others needs to know, whatever its positions.
 #[derive(Debug)]
@@ -58,20 +58,20 @@ pub(super) struct InnerSurface<'a> {
     closest: ClosestPoint,
     /// As of [`LayerTopology::facing`].
     facing: Vec<f64>,
-    bounds: [[f64; 3]; 2],
+    bounds: ([f64; 3], [f64; 3]),
 }
 
 impl<'a> InnerSurface<'a> {
     /// Of the garment of `tree`; `facing` as of [`LayerTopology::facing`].
     pub fn new(topology: &'a LayerTopology, tree: &TriangleTree<'_>, facing: Vec<f64>) -> Self {
         let closest = ClosestPoint::of_tree(tree, |_| true);
-        Self { topology, closest, facing, bounds: bounds(tree.positions()) }
+        Self { topology, closest, facing, bounds: bounds(tree.positions().iter().copied()) }
     }
 
     /// Height of `p` over the garment (m), negative under it, if it is within `reach` and `p` lies over or under the garment and
     /// not beside it.
     pub fn height(&self, p: [f64; 3], reach: f64) -> Option<f64> {
-        let [low, high] = self.bounds;
+        let (low, high) = self.bounds;
         if !(0..3).all(|k| p[k] - reach <= high[k] && low[k] - reach <= p[k]) {
             return None;
         }
@@ -99,11 +99,4 @@ impl<'a> InnerSurface<'a> {
             _ => (0..3).any(|k| barycentric[k] > 0.5 && is_border[face[k] as usize]),
         }
     }
-}
-
-/// Smallest and largest coordinates.
-fn bounds(positions: &[[f64; 3]]) -> [[f64; 3]; 2] {
-    positions.iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
-        [std::array::from_fn(|k| low[k].min(p[k])), std::array::from_fn(|k| high[k].max(p[k]))]
-    })
 }

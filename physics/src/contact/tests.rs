@@ -3,8 +3,10 @@
 use super::*;
 use crate::mesh::TriMesh;
 use crate::mesh::shapes::{SplitMix, grid, icosphere, irregular_grid, mapped, tube, union};
-use crate::query::grid_oracle::{self, GridPoint};
 use crate::query::{Distance, Surface};
+use grid_oracle::GridPoint;
+
+mod grid_oracle;
 
 type Point = GridPoint;
 

@@ -27,10 +27,10 @@ use crate::vec3::{
 };
 
 /// τ in units of twice the rest area.
-pub const COLLAPSE_RATIO: f64 = 0.05;
+pub const HINGE_COLLAPSE_RATIO: f64 = 0.05;
 
 /// Smallest τ in units of the squared median edge.
-pub const COLLAPSE_FLOOR: f64 = 1e-3;
+pub const HINGE_COLLAPSE_FLOOR: f64 = 1e-3;
 
 /// The bending energy of one garment.
 #[derive(Debug, Clone)]
@@ -46,17 +46,10 @@ pub struct Bending {
 impl Bending {
     /// Prepares the energy of a garment with rest shape `rest` and its `hinges`; `stiffness` (J/rad²).
     pub fn new(rest: &TriMesh, hinges: &[Hinge], stiffness: f64) -> Self {
-        Self::with_median_edge(rest, hinges, stiffness, rest.median_edge_length())
-    }
-
-    pub(super) fn with_median_edge(
-        rest: &TriMesh,
-        hinges: &[Hinge],
-        stiffness: f64,
-        median_edge: f64,
-    ) -> Self {
-        let floor = COLLAPSE_FLOOR * median_edge * median_edge;
-        let collapse = |face: u32| (COLLAPSE_RATIO * 2.0 * rest.face_area(face as usize)).max(floor).powi(2);
+        let median_edge = rest.median_edge_length();
+        let floor = HINGE_COLLAPSE_FLOOR * median_edge * median_edge;
+        let collapse =
+            |face: u32| (HINGE_COLLAPSE_RATIO * 2.0 * rest.face_area(face as usize)).max(floor).powi(2);
         let collapse_squared = hinges.iter().map(|h| h.faces.map(collapse)).collect();
         let hinges: Vec<[u32; 4]> =
             hinges.iter().map(|h| [h.edge[0], h.edge[1], h.opposite[0], h.opposite[1]]).collect();

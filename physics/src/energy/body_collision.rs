@@ -20,7 +20,7 @@ pub(super) struct BodyCollision {
 }
 
 impl BodyCollision {
-    /// The points closer to the body, and what is worn between, than the margin by an excess (m), with the derivative of their
+    /// The points closer to the body, and to garments between, than the margin by an excess (m), with the derivative of their
     /// distance.
     fn in_contact<T: Real>(
         &self,

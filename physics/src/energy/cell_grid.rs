@@ -1,7 +1,7 @@
 //! Points sorted into cells, for sums over all pairs within a radius.
 
 use crate::real::Real;
-use crate::vec3::{is_finite, to_f64};
+use crate::vec3::{bounds, is_finite, to_f64};
 
 /// Cells per radius where points are sparse and where they are dense: smaller cells fit the sphere better, and cost more
 /// look-ups and longer lists per point.
@@ -11,7 +11,7 @@ const CELLS_PER_RADIUS: [i64; 2] = [2, 4];
 const DENSE: usize = 48;
 
 /// Cells are larger than the radius asks for by this share: a pair that rounding puts inside the radius is not missed.
-const SLACK: f64 = 1e-6;
+const CELL_SLACK: f64 = 1e-6;
 
 /// Points sorted by cell. Cells are kept as a sorted list, not as an array: one vertex far away costs nothing.
 pub(crate) struct CellGrid<T> {
@@ -21,9 +21,8 @@ pub(crate) struct CellGrid<T> {
     /// The same points, one list per axis.
     pub(crate) axes: [Vec<T>; 3],
     per_radius: i64,
-    /// Key and first point of every occupied cell, ascending; the end of the last cell follows.
+    /// Key and first point of every occupied cell, ascending; a larger key and the end of the last cell follow.
     cells: Vec<(u64, u32)>,
-    end: u32,
 }
 
 /// Bits per axis of a cell key.
@@ -42,11 +41,9 @@ impl<T: Real> CellGrid<T> {
     }
 
     fn with_cells(positions: &[[T; 3]], radius: f64, per_radius: i64) -> Self {
-        let mut low = [f64::INFINITY; 3];
-        for p in positions.iter().filter(|p| is_finite(**p)) {
-            low = std::array::from_fn(|k| low[k].min(p[k].to_f64()));
-        }
-        let per_metre = per_radius as f64 / (radius * (1.0 + SLACK));
+        let finite = positions.iter().filter(|p| is_finite(**p));
+        let (low, _) = bounds(finite.map(|p| to_f64(*p)));
+        let per_metre = per_radius as f64 / (radius * (1.0 + CELL_SLACK));
         // Beyond 2 million cells along an axis, points share the last cell: slower, still right.
         let last = (1i64 << KEY_BITS) - 1 - 2 * KEY_MARGIN;
         let mut keyed: Vec<(u64, u32)> = positions
@@ -68,24 +65,21 @@ impl<T: Real> CellGrid<T> {
                 cells.push((key, k as u32));
             }
         }
+        cells.push((u64::MAX, keyed.len() as u32));
         let order: Vec<u32> = keyed.iter().map(|&(_, v)| v).collect();
         let points: Vec<[T; 3]> = order.iter().map(|&v| positions[v as usize]).collect();
         let axes = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect());
-        Self { order, points, axes, per_radius, cells, end: keyed.len() as u32 }
-    }
-
-    fn start(&self, cell: usize) -> usize {
-        self.cells.get(cell).map_or(self.end, |&(_, start)| start) as usize
+        Self { order, points, axes, per_radius, cells }
     }
 
     /// Number of occupied cells.
     pub(crate) fn cell_count(&self) -> usize {
-        self.cells.len()
+        self.cells.len() - 1
     }
 
     /// The sorted points of a cell.
     pub(crate) fn range(&self, cell: usize) -> std::ops::Range<usize> {
-        self.start(cell)..self.start(cell + 1)
+        self.cells[cell].1 as usize..self.cells[cell + 1].1 as usize
     }
 
     /// Calls `visit` with the points of the cells that come closer to `cell` than the radius, in order; a row of cells along x
@@ -105,7 +99,7 @@ impl<T: Real> CellGrid<T> {
                 let from = self.cells.partition_point(|&(k, _)| k < first);
                 let to = from + self.cells[from..].iter().take_while(|&&(k, _)| k <= last).count();
                 if from < to {
-                    visit(self.start(from)..self.start(to));
+                    visit(self.cells[from].1 as usize..self.cells[to].1 as usize);
                 }
             }
         }

@@ -103,9 +103,7 @@ impl ContactPoints {
         let g = scale(g, corners.weight());
         corners.iter().for_each(|v| target.add(v, g));
     }
-}
 
-impl ContactPoints {
     /// Adds the second derivatives `block` at a point.
     pub(crate) fn add_curvature(&self, sink: &mut dyn CurvatureSink, point: usize, block: [[f64; 3]; 3]) {
         let corners = self.corners(point);

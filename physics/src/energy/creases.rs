@@ -22,7 +22,7 @@ use crate::real::Real;
 use crate::vec3::{add, add_scaled, axpy, dot, norm_squared, scale, sub, to_f64};
 
 /// Sides farther than this beyond the nearest one, in widths, have no weight.
-const REACH: f64 = 12.0;
+const SMOOTH_WIDTHS: f64 = 12.0;
 
 /// Sweeps over all creases until their combinations are least.
 const SWEEPS: usize = 30;
@@ -157,5 +157,5 @@ impl Crease<'_> {
 
 /// How far apart the sides of a crease may be for [`Creases::smooth`] with `width` (m) to notice.
 pub(crate) fn reach(width: f64) -> f64 {
-    REACH * width
+    SMOOTH_WIDTHS * width
 }

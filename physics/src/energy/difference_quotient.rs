@@ -16,7 +16,7 @@
 use crate::vec3;
 
 /// Largest relative difference between a gradient and its quotients that counts as agreement.
-pub const TOLERANCE: f64 = 1e-6;
+pub const GRADIENT_TOLERANCE: f64 = 1e-6;
 
 /// Ratio of one step of the ladder to the next.
 const LADDER: f64 = 4.0;
@@ -25,7 +25,7 @@ const LADDER: f64 = 4.0;
 const RUNGS: usize = 9;
 
 /// Uncertainty of a quotient, in units of the tolerance, below which no further step is tried.
-const ENOUGH: f64 = 0.02;
+const CERTAIN: f64 = 0.02;
 
 /// The larger one; NaN if either is, where `f64::max` would hide it.
 pub(super) fn nan_max(a: f64, b: f64) -> f64 {
@@ -94,7 +94,7 @@ impl Ladder {
         let quotient = self.quotient(probe, line, 0.0, self.first);
         let error = (quotient.derivative - expected).abs();
         let result = LineResult { error, resolution: quotient.uncertainty, is_nonsmooth: false };
-        if error <= TOLERANCE * self.scale || !self.jumps(probe, line) {
+        if error <= GRADIENT_TOLERANCE * self.scale || !self.jumps(probe, line) {
             return result;
         }
         let [left, right] = [-1.0, 1.0].map(|side| self.side(probe, line, side));
@@ -121,7 +121,8 @@ impl Ladder {
         let steps: Vec<f64> = self.steps(self.first).collect();
         steps.windows(2).rev().any(|pair| {
             let (wide, narrow) = (across(pair[0]), across(pair[1]));
-            (persists(wide.0, narrow.0) && narrow.0 > TOLERANCE * self.scale) || persists(wide.1, narrow.1)
+            (persists(wide.0, narrow.0) && narrow.0 > GRADIENT_TOLERANCE * self.scale)
+                || persists(wide.1, narrow.1)
         })
     }
 
@@ -136,7 +137,7 @@ impl Ladder {
             if error < best.error {
                 best = LineResult { error, resolution: quotient.uncertainty, is_nonsmooth: true };
             }
-            if best.error <= TOLERANCE * self.scale {
+            if best.error <= GRADIENT_TOLERANCE * self.scale {
                 break;
             }
         }
@@ -171,7 +172,7 @@ impl Ladder {
                 row.push(extrapolated);
             }
             previous = row;
-            if previous.len() >= 3 && best.uncertainty <= ENOUGH * TOLERANCE * self.scale {
+            if previous.len() >= 3 && best.uncertainty <= CERTAIN * GRADIENT_TOLERANCE * self.scale {
                 break;
             }
         }

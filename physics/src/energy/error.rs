@@ -51,9 +51,9 @@ pub enum EnergyError {
         found: usize,
     },
 
-    /// What is worn below a garment does not fit the garment.
+    /// The thicknesses below a garment do not fit the garment.
     #[error(
-        "garment {garment} has {expected} vertices but {found} thicknesses of what is worn below; hint: pass one per vertex, \
+        "garment {garment} has {expected} vertices but {found} thicknesses of the garments below; hint: pass one per vertex, \
          or none"
     )]
     ThicknessBelow {

@@ -6,7 +6,7 @@ use super::gravity::Gravity;
 use super::holding::Holding;
 use super::layer_collision::InnerLayer;
 use super::repulsion::Repulsion;
-use super::strain::{Needle, Strain};
+use super::strain::Strain;
 use super::{ContactPoints, EnergyError, EnergySettings, GarmentTerm, Material, Term};
 use crate::mesh::{Topology, TriMesh};
 use crate::real::Real;
@@ -47,13 +47,11 @@ impl<T: Real> GarmentEnergies<T> {
             return Err(EnergyError::NoArea { faces: rest.face_count() });
         }
         let material = settings.material;
-        let median_edge = rest.median_edge_length();
-        let bending =
-            Bending::with_median_edge(rest, &topology.hinges, material.bending_stiffness, median_edge);
-        let needle = Needle { ratio: settings.needle_ratio, median_edge };
+        let strain = Strain::new(rest, &material, settings.needle_ratio);
+        let bending = Bending::new(rest, &topology.hinges, material.bending_stiffness);
         let contact_points = ContactPoints::new(rest, topology);
         let mut terms: Vec<(Term, Box<dyn GarmentTerm<T>>)> = vec![
-            (Term::Strain, Box::new(Strain::with_needle(rest, &material, needle))),
+            (Term::Strain, Box::new(strain)),
             (Term::Bending, Box::new(bending)),
             (Term::Gravity, Box::new(Gravity::new(rest, &material, settings.gravity_acceleration))),
             (
@@ -65,7 +63,7 @@ impl<T: Real> GarmentEnergies<T> {
         if holding {
             terms.push((Term::Holding, Box::new(Holding::new(rest, settings.holding_fraction))));
         }
-        let as_inner = InnerLayer::new(rest, topology, median_edge);
+        let as_inner = InnerLayer::new(rest, topology);
         Ok(Self { vertex_count, material, contact_points, as_inner, terms })
     }
 

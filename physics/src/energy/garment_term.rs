@@ -19,7 +19,7 @@ pub struct GarmentState<'a, T> {
     pub holding_reference: &'a [[T; 3]],
     /// Reads the heights of the holding energy off posed positions `[V]`; `None`: off canonical ones.
     pub pull_back: Option<&'a [HeightRow]>,
-    /// Thickness of what is worn below each vertex `[V]` (m); empty: nothing is.
+    /// Thickness of the garments below each vertex `[V]` (m); empty: there are none.
     pub thickness_below: &'a [T],
     /// Signed distance of every contact point to the body, those of the vertices first; empty when no active term needs it.
     pub gaps: &'a [Gap<T>],

@@ -28,7 +28,7 @@ use crate::real::Real;
 use crate::vec3::{distance_squared, norm, sub, to_f64};
 
 /// Room for rounding in `f32`.
-const ROUNDING: f64 = 1.001;
+const BOUND_ROUNDING: f64 = 1.001;
 
 /// A bound on every entry of the gradient of `term` (weight 1) in `scene`, whose garments have the rest shapes `rest`,
 /// at `posed` and `canonical` (`[ΣV, 3]` (m)); see the module for the formulas. Infinite where there is none, NaN if a
@@ -44,23 +44,20 @@ pub fn gradient_bound<T: Real>(
     canonical: &[[T; 3]],
 ) -> f64 {
     assert_eq!(rest.len(), scene.garments.len(), "one rest mesh per garment");
-    let mut garments = Vec::with_capacity(rest.len());
-    let mut start = 0;
-    for (mesh, garment) in rest.iter().zip(&scene.garments) {
-        let range = start..start + mesh.vertex_count();
-        start = range.end;
-        garments.push(Deformed {
-            rest: mesh,
-            median_edge: mesh.median_edge_length(),
-            posed: posed[range.clone()].iter().map(|p| to_f64(*p)).collect(),
-            canonical: canonical[range].iter().map(|p| to_f64(*p)).collect(),
-            reference: garment.holding_reference.iter().map(|p| to_f64(*p)).collect(),
-            pull_back: garment.pull_back.as_deref(),
-            contact_points: garment.energies.contact_points(),
-            thickness_below: garment.most_thickness(),
-            material: *garment.energies.material(),
-        });
-    }
+    let wide = |positions: &[[T; 3]]| positions.iter().map(|p| to_f64(*p)).collect();
+    let parts = scene.garments.iter().zip(rest).zip(scene.ranges());
+    let deformed = parts.map(|((garment, mesh), range)| Deformed {
+        rest: mesh,
+        median_edge: mesh.median_edge_length(),
+        posed: wide(&posed[range.clone()]),
+        canonical: wide(&canonical[range]),
+        reference: wide(&garment.holding_reference),
+        pull_back: garment.pull_back.as_deref(),
+        contact_points: garment.energies.contact_points(),
+        thickness_below: garment.most_thickness(),
+        material: *garment.energies.material(),
+    });
+    let garments: Vec<Deformed<'_>> = deformed.collect();
     let settings = &scene.settings;
     let of_garments = |bound: &dyn Fn(&Deformed<'_>) -> f64| garments.iter().map(bound).fold(0.0, f64::max);
     let to_body = |g: &Deformed<'_>| {
@@ -100,7 +97,7 @@ pub fn gradient_bound<T: Real>(
             over_pairs(&|inner, outer| 3.0 * inner.posed.len().max(outer.posed.len()) as f64 * reach * reach)
         }
     };
-    ROUNDING * bound
+    BOUND_ROUNDING * bound
 }
 
 /// A garment at rest and deformed.
@@ -170,8 +167,9 @@ impl Deformed<'_> {
     }
 
     fn bending(&self) -> f64 {
-        let floor = bending::COLLAPSE_FLOOR * self.median_edge * self.median_edge;
-        let collapse = |f: u32| (bending::COLLAPSE_RATIO * 2.0 * self.rest.face_area(f as usize)).max(floor);
+        let floor = bending::HINGE_COLLAPSE_FLOOR * self.median_edge * self.median_edge;
+        let collapse =
+            |f: u32| (bending::HINGE_COLLAPSE_RATIO * 2.0 * self.rest.face_area(f as usize)).max(floor);
         let topology = Topology::new(self.rest);
         let hinges = topology.hinges.iter().map(|h| {
             let length = self.longest(h.faces[0]).max(self.longest(h.faces[1]));
@@ -207,7 +205,8 @@ impl Deformed<'_> {
         let points = outer.contact_points.at(&outer.posed, settings.layer_samples);
         let farthest = points.iter().map(distance).fold(0.0, f64::max);
         let reach = settings.layer_gate.map_or(farthest, |gate| farthest.min(aside(gate)));
-        let floor = layer_collision::nearest_vertex::COLLAPSE_FLOOR * self.median_edge * self.median_edge;
+        let floor =
+            layer_collision::nearest_vertex::NORMAL_COLLAPSE_FLOOR * self.median_edge * self.median_edge;
         let longest = (0..self.rest.face_count() as u32).map(|f| self.longest(f)).fold(0.0, f64::max);
         let turning = self.rest.faces().iter().map(|face| (*face, 3.0 * longest * reach / floor));
         let pair = settings.for_pair([self.material.thickness, outer.material.thickness]);

@@ -12,7 +12,7 @@
 
 use rayon::prelude::*;
 
-pub use super::difference_quotient::TOLERANCE;
+pub use super::difference_quotient::GRADIENT_TOLERANCE;
 use super::difference_quotient::{Ladder, Line, LineResult, Probe, nan_max};
 use super::{SceneEnergy, SceneValue, Term, TermMap};
 use crate::mesh::shapes::SplitMix;
@@ -70,9 +70,9 @@ pub struct GradientReport {
 }
 
 impl GradientReport {
-    /// Whether gradient and quotients agree to [`TOLERANCE`].
+    /// Whether gradient and quotients agree to [`GRADIENT_TOLERANCE`].
     pub fn passes(&self) -> bool {
-        self.error <= TOLERANCE
+        self.error <= GRADIENT_TOLERANCE
     }
 }
 
@@ -92,20 +92,21 @@ pub fn check_gradient(
     raw_value(&scene.value(posed, canonical), term)?;
     let edges = scene.garments.iter().map(|g| g.energies.as_inner().median_edge());
     let edge = edges.fold(LONGEST_EDGE, f64::min);
-    Some(if scene.needs_canonical() {
-        let value = |x: &[[f64; 3]]| scene.value(posed, x).total;
-        let gradient = |x: &[[f64; 3]]| {
-            let value = scene.evaluate(posed, x);
-            (value.total, value.canonical_gradient)
-        };
-        check_function(&value, &gradient, canonical, edge, settings)
-    } else {
-        let value = |x: &[[f64; 3]]| scene.value(x, canonical).total;
-        let gradient = |x: &[[f64; 3]]| {
-            let value = scene.evaluate(x, canonical);
-            (value.total, value.posed_gradient)
-        };
-        check_function(&value, &gradient, posed, edge, settings)
+    Some(match scene.needs_canonical() {
+        true => {
+            let gradient = |x: &[[f64; 3]]| {
+                let value = scene.evaluate(posed, x);
+                (value.total, value.canonical_gradient)
+            };
+            check_function(&|x| scene.value(posed, x).total, &gradient, canonical, edge, settings)
+        }
+        false => {
+            let gradient = |x: &[[f64; 3]]| {
+                let value = scene.evaluate(x, canonical);
+                (value.total, value.posed_gradient)
+            };
+            check_function(&|x| scene.value(x, canonical).total, &gradient, posed, edge, settings)
+        }
     })
 }
 
@@ -131,7 +132,7 @@ pub fn check_function(
     let everything: Line = (0..3 * positions.len()).map(|c| (c, random.symmetric())).collect();
     let scale = largest.max(largest_entry(&probe.evaluate(&everything, first_step).1));
     // Where the value is large against its gradient (far away, gravity), a short step drowns in rounding.
-    let resolving = f64::EPSILON * here.abs() / (1e-2 * TOLERANCE * scale);
+    let resolving = f64::EPSILON * here.abs() / (1e-2 * GRADIENT_TOLERANCE * scale);
     let first_step = if resolving.is_finite() { first_step.max(resolving.min(extent)) } else { first_step };
 
     let lines = lines(&gradient, settings, &mut random);

@@ -19,16 +19,20 @@ use crate::vec3::{scale, to_f64};
 
 /// Blended transforms with a smaller determinant have no height before skinning: half a turn between two bones flattens the
 /// cloth that both carry. One of 0.05 belongs to bones of equal weight at 154°, beyond every joint limit.
-const SMALLEST_DETERMINANT: f64 = 0.05;
+const SMALLEST_HELD_DETERMINANT: f64 = 0.05;
 
 /// The row of every one of `transforms`, canonical → posed; zero where there is none, whose vertices are then not held.
 pub fn height_rows(transforms: &[Transform]) -> Vec<HeightRow> {
-    transforms.iter().map(|t| inverse(t, SMALLEST_DETERMINANT).map_or([0.0; 4], |rows| rows[1])).collect()
+    transforms
+        .iter()
+        .map(|t| inverse(t, SMALLEST_HELD_DETERMINANT).map_or([0.0; 4], |rows| rows[1]))
+        .collect()
 }
 
 /// The holding energy of one garment.
 #[derive(Debug, Clone)]
 pub struct Holding {
+    /// Vertices, ascending.
     held: Vec<u32>,
 }
 
@@ -42,11 +46,6 @@ impl Holding {
         held.truncate((fraction * positions.len() as f64 - 1e-9).ceil().max(0.0) as usize);
         held.sort_unstable();
         Self { held }
-    }
-
-    /// The held vertices, ascending.
-    pub fn held(&self) -> &[u32] {
-        &self.held
     }
 
     /// Every held vertex with its height above the reference (m), and how that changes with the position it is read off.
@@ -119,9 +118,9 @@ mod tests {
         let sheet = shapes::grid(0.3, 0.9, 4, 9);
         let holding = Holding::new(&sheet, 0.1);
         // 50 vertices, rows of 5: the top row.
-        assert_eq!(holding.held(), [45, 46, 47, 48, 49]);
-        assert!(Holding::new(&sheet, 0.0).held().is_empty());
-        assert_eq!(Holding::new(&sheet, 1.0).held().len(), 50);
+        assert_eq!(holding.held, [45, 46, 47, 48, 49]);
+        assert!(Holding::new(&sheet, 0.0).held.is_empty());
+        assert_eq!(Holding::new(&sheet, 1.0).held.len(), 50);
         let raised = shapes::mapped(&sheet, |[x, y, z]| [x + 1.0, y + 0.5, z]);
         let settings = EnergySettings::default();
         let energy = holding.evaluate(&state(&sheet, &raised, &sheet, None, &settings), None);

@@ -9,7 +9,7 @@ use crate::vec3::{accumulate, from_f64, scale, sub, zero};
 pub const CONTACT_DISTANCE: f64 = 1e-4;
 
 /// Candidates per step of the inner loop.
-const LANES: usize = 16;
+const PAIR_LANES: usize = 16;
 
 /// Steps after which products of squared distances move to `f64`: four squares of at least δ² = 1e-8 stay above the smallest
 /// normal `f32`, and so do four of at most 1, or of a radius below 1e4 m, below the largest.
@@ -91,18 +91,16 @@ impl<T: Real> Kernel<T> {
         responses
     }
 
-    /// All candidates, whose number is a multiple of [`LANES`], at once.
+    /// All candidates, whose number is a multiple of [`PAIR_LANES`], at once.
     #[inline(always)]
     fn candidates(&self, p: [T; 3], candidates: &Candidates<T>) -> VertexResponse<T> {
-        let mut pull = [[T::zero(); LANES]; 3];
-        let mut excess = [T::zero(); LANES];
-        let mut product = [T::one(); LANES];
+        let mut pull = [[T::zero(); PAIR_LANES]; 3];
+        let mut excess = [T::zero(); PAIR_LANES];
+        let mut product = [T::one(); PAIR_LANES];
         let mut logarithm = ProductLogarithm::new();
-        let (xs, _) = candidates.x.as_chunks::<LANES>();
-        let (ys, _) = candidates.y.as_chunks::<LANES>();
-        let (zs, _) = candidates.z.as_chunks::<LANES>();
+        let [xs, ys, zs] = candidates.axes.each_ref().map(|axis| axis.as_chunks::<PAIR_LANES>().0);
         for (step, ((x, y), z)) in xs.iter().zip(ys).zip(zs).enumerate() {
-            for lane in 0..LANES {
+            for lane in 0..PAIR_LANES {
                 let (dx, dy, dz) = (p[0] - x[lane], p[1] - y[lane], p[2] - z[lane]);
                 let squared = dx * dx + dy * dy + dz * dz;
                 let inside = squared < self.radius_squared;
@@ -117,11 +115,11 @@ impl<T: Real> Kernel<T> {
             }
             if step % STEPS_PER_PRODUCT == STEPS_PER_PRODUCT - 1 {
                 logarithm.multiply(product);
-                product = [T::one(); LANES];
+                product = [T::one(); PAIR_LANES];
             }
         }
         logarithm.multiply(product);
-        let sum = |lanes: [T; LANES]| lanes.into_iter().map(Real::to_f64).sum::<f64>();
+        let sum = |lanes: [T; PAIR_LANES]| lanes.into_iter().map(Real::to_f64).sum::<f64>();
         let energy = sum(excess) / self.contact_squared.to_f64() - logarithm.value();
         (energy, from_f64(pull.map(|lanes| -2.0 * sum(lanes))))
     }
@@ -130,9 +128,9 @@ impl<T: Real> Kernel<T> {
 /// `log Π x` over many positive factors in lanes, without a logarithm per factor.
 struct ProductLogarithm {
     /// Each in [1, 2).
-    mantissas: [f64; LANES],
+    mantissas: [f64; PAIR_LANES],
     /// Sum of the biased exponents that were split off.
-    exponents: [u64; LANES],
+    exponents: [u64; PAIR_LANES],
     count: u64,
 }
 
@@ -142,19 +140,19 @@ impl ProductLogarithm {
 
     #[inline(always)]
     fn new() -> Self {
-        Self { mantissas: [1.0; LANES], exponents: [0; LANES], count: 0 }
+        Self { mantissas: [1.0; PAIR_LANES], exponents: [0; PAIR_LANES], count: 0 }
     }
 
     /// Factors must be positive and normal `f64` that stay normal when doubled.
     #[inline(always)]
-    fn multiply<T: Real>(&mut self, factors: [T; LANES]) {
-        for lane in 0..LANES {
+    fn multiply<T: Real>(&mut self, factors: [T; PAIR_LANES]) {
+        for lane in 0..PAIR_LANES {
             let bits = (self.mantissas[lane] * factors[lane].to_f64()).to_bits();
             self.exponents[lane] += bits >> Self::MANTISSA_BITS;
             let mantissa = bits & ((1 << Self::MANTISSA_BITS) - 1);
             self.mantissas[lane] = f64::from_bits(mantissa | (Self::BIAS << Self::MANTISSA_BITS));
         }
-        self.count += LANES as u64;
+        self.count += PAIR_LANES as u64;
     }
 
     #[inline(always)]
@@ -165,35 +163,29 @@ impl ProductLogarithm {
     }
 }
 
-/// Coordinates of the vertices around a cell, padded with far points to a multiple of [`LANES`].
+/// Coordinates of the vertices around a cell, padded with far points to a multiple of [`PAIR_LANES`].
 #[derive(Debug, Default)]
 pub(super) struct Candidates<T> {
-    x: Vec<T>,
-    y: Vec<T>,
-    z: Vec<T>,
+    axes: [Vec<T>; 3],
 }
 
 impl<T: Real> Candidates<T> {
     pub fn clear(&mut self) {
-        self.x.clear();
-        self.y.clear();
-        self.z.clear();
+        self.axes.iter_mut().for_each(Vec::clear);
     }
 
     /// Appends the points `range` of lists of coordinates.
-    pub fn extend(&mut self, [x, y, z]: &[Vec<T>; 3], range: Range<usize>) {
-        self.x.extend_from_slice(&x[range.clone()]);
-        self.y.extend_from_slice(&y[range.clone()]);
-        self.z.extend_from_slice(&z[range]);
+    pub fn extend(&mut self, axes: &[Vec<T>; 3], range: Range<usize>) {
+        for (to, from) in self.axes.iter_mut().zip(axes) {
+            to.extend_from_slice(&from[range.clone()]);
+        }
     }
 
     pub fn pad(&mut self) {
         // Finite, so that its offset times a zero weight is zero; its square is infinite or nearly so, hence outside.
         let far = T::max_value().sqrt();
-        let padded = self.x.len().next_multiple_of(LANES);
-        self.x.resize(padded, far);
-        self.y.resize(padded, far);
-        self.z.resize(padded, far);
+        let padded = self.axes[0].len().next_multiple_of(PAIR_LANES);
+        self.axes.iter_mut().for_each(|axis| axis.resize(padded, far));
     }
 }
 
@@ -235,7 +227,8 @@ mod tests {
         let mut product = ProductLogarithm::new();
         let mut expected = 0.0;
         for _ in 0..500 {
-            let factors: [f64; LANES] = std::array::from_fn(|_| 10f64.powf(16.0 * random.symmetric() - 16.0));
+            let factors: [f64; PAIR_LANES] =
+                std::array::from_fn(|_| 10f64.powf(16.0 * random.symmetric() - 16.0));
             expected += factors.iter().map(|x| x.ln()).sum::<f64>();
             product.multiply(factors);
         }

@@ -65,7 +65,7 @@ impl Repulsion {
             Some(reach) if 2 * reach + 1 < count => {
                 // Of the N−1 others a vertex meets `2·reach`.
                 factor *= (count - 1) as f64 / (2 * reach) as f64;
-                let sample = Sample::new(settings.repulsion_sample, count, reach);
+                let sample = PairSample::new(settings.repulsion_sample, count, reach);
                 sampled_pairs(positions, &self.excluded, &sample, kernel)
             }
             _ => all_pairs(positions, &self.excluded, kernel),
@@ -89,13 +89,13 @@ impl<T: Real> GarmentTerm<T> for Repulsion {
 
 /// A random sample of pairs: all vertices on a circle in random order, each with the nearest ones on both sides. Every vertex
 /// meets equally many, no pair comes twice, and over the samples each pair is as likely as any other.
-struct Sample {
+struct PairSample {
     circle: Vec<u32>,
     place: Vec<u32>,
     reach: usize,
 }
 
-impl Sample {
+impl PairSample {
     fn new(number: u32, count: usize, reach: usize) -> Self {
         let mut random = SplitMix::new(u64::from(number));
         let mut circle: Vec<u32> = (0..count as u32).collect();
@@ -155,7 +155,7 @@ fn all_pairs<T: Real>(
 fn sampled_pairs<T: Real>(
     positions: &[[T; 3]],
     excluded: &CompressedRows<u32>,
-    sample: &Sample,
+    sample: &PairSample,
     kernel: Kernel<T>,
 ) -> (f64, Vec<(u32, [T; 3])>) {
     let response = |v: usize| {
@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn in_a_sample_every_vertex_meets_equally_many_and_each_of_them_once() {
         for (count, reach) in [(9, 4), (10, 4), (57, 8)] {
-            let sample = Sample::new(3, count, reach);
+            let sample = PairSample::new(3, count, reach);
             for v in 0..count {
                 let mut partners: Vec<u32> = sample.partners(v).collect();
                 for &partner in &partners {
@@ -186,6 +186,6 @@ mod tests {
                 assert_eq!(partners.len(), 2 * reach);
             }
         }
-        assert!(Sample::new(3, 57, 8).circle != Sample::new(4, 57, 8).circle);
+        assert!(PairSample::new(3, 57, 8).circle != PairSample::new(4, 57, 8).circle);
     }
 }

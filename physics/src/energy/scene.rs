@@ -21,15 +21,15 @@ pub struct SceneGarment<T: Real> {
     /// Heights before skinning as functions of posed positions `[V]`, which the holding energy then acts on
     /// ([`super::holding`]); `None`: it acts on canonical positions (the paper's form).
     pub pull_back: Option<Vec<HeightRow>>,
-    /// Thickness of what is worn below each vertex `[V]` (m) without being in the scene: the body is that much thicker there.
-    /// Empty: nothing is.
+    /// Thickness of the garments below each vertex `[V]` (m) that are not in the scene: the body is that much thicker there.
+    /// Empty: there are none.
     pub thickness_below: Vec<T>,
     /// Weight of every term; entries of layer terms are ignored.
     pub weights: TermMap<f64>,
 }
 
 impl<T: Real> SceneGarment<T> {
-    /// The largest thickness of what is worn below (m).
+    /// The largest thickness of the garments below (m).
     pub(super) fn most_thickness(&self) -> f64 {
         self.thickness_below.iter().fold(0.0, |most, t| most.max(Real::to_f64(*t)))
     }

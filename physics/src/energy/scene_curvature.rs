@@ -1,23 +1,19 @@
 //! Curvature of the weighted sum of a scene: what the static solver needs besides the gradient.
 
 use super::curvature::{CurvatureSink, Scaled};
-use super::scene_sum::{BodyMemory, memories};
+use super::scene_sum::{BodyMemory, is_weighted, memories};
 use super::{LayerContact, SceneEnergy, SceneLayers, Term};
 use crate::real::Real;
 
 impl<T: Real> SceneEnergy<T> {
     /// A positive semidefinite approximation of the second derivatives of the weighted sum with respect to posed positions,
     /// vertices numbered as in `posed`; with respect to canonical ones for the holding energy of garments that are not pulled
-    /// back. Of the layer terms only the collision by the closest point has one.
+    /// back. Of the layer terms only the collision by the closest point has one. `memory`: of earlier calls for positions that are
+    /// near these.
     ///
     /// # Panics
     /// As [`evaluate`](Self::evaluate).
-    pub fn curvature(&self, posed: &[[T; 3]], canonical: &[[T; 3]], sink: &mut dyn CurvatureSink) {
-        self.curvature_near(posed, canonical, sink, None);
-    }
-
-    /// The same, for positions that are near those of earlier calls with the same `memory`.
-    pub(crate) fn curvature_near(
+    pub(crate) fn curvature(
         &self,
         posed: &[[T; 3]],
         canonical: &[[T; 3]],
@@ -29,7 +25,7 @@ impl<T: Real> SceneEnergy<T> {
         for (i, (garment, near)) in self.garments.iter().zip(memories).enumerate() {
             let (range, offset) = (ranges[i].clone(), ranges[i].start);
             let canonical = canonical.get(range.clone()).unwrap_or(&[]);
-            let shared = self.share(i, &posed[range], canonical, &|_, weight| weight != 0.0, near);
+            let shared = self.share(i, &posed[range], canonical, is_weighted, near);
             for (term, energy) in garment.energies.terms() {
                 let weight = garment.weights[term];
                 if weight > 0.0 {
@@ -37,7 +33,9 @@ impl<T: Real> SceneEnergy<T> {
                 }
             }
         }
-        for pair in self.layers.iter().filter(|pair| self.couples(pair)) {
+        let is_smooth = self.settings.layer_contact == LayerContact::ClosestPoint;
+        let couples = |pair: &&SceneLayers| is_smooth && pair.weights[Term::LayerCollision] > 0.0;
+        for pair in self.layers.iter().filter(couples) {
             let [inner, outer] = [pair.inner, pair.outer].map(|garment| ranges[garment].clone());
             let as_inner = self.garments[pair.inner].energies.as_inner();
             let surface = as_inner.posed(&posed[inner.clone()], self.settings.layer_contact);
@@ -46,10 +44,5 @@ impl<T: Real> SceneEnergy<T> {
             let settings = self.settings_of(pair);
             as_inner.curvature(&surface, &points, &settings, [inner.start, outer.start], &mut sink);
         }
-    }
-
-    /// Whether [`curvature`](Self::curvature) couples the garments of a pair where they touch.
-    fn couples(&self, pair: &SceneLayers) -> bool {
-        self.settings.layer_contact == LayerContact::ClosestPoint && pair.weights[Term::LayerCollision] > 0.0
     }
 }

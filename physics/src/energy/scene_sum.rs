@@ -32,13 +32,9 @@ pub fn weighted(weights: &TermMap<f64>, raw: &TermMap<Option<f64>>) -> f64 {
     terms.filter_map(|(term, value)| value.map(|v| weights[term] * v)).sum()
 }
 
-/// Which terms a run evaluates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Selection {
-    /// Those with a weight.
-    Weighted,
-    /// All that there is input for.
-    All,
+/// Whether a term of this weight counts.
+pub(super) fn is_weighted(weight: f64) -> bool {
+    weight != 0.0
 }
 
 /// What several terms share of a garment at its present positions.
@@ -74,6 +70,13 @@ pub(super) fn memories(memory: Option<&mut BodyMemory>, count: usize) -> Vec<Opt
     }
 }
 
+/// Raw values of one garment and its weighted gradients by posed and canonical positions, if they are asked for.
+struct GarmentValue<T> {
+    raw: TermMap<Option<f64>>,
+    posed: Option<Vec<[T; 3]>>,
+    canonical: Option<Vec<[T; 3]>>,
+}
+
 /// Raw values of one pair and its weighted gradients at the inner and the outer garment.
 struct PairValue<T> {
     raw: TermMap<Option<f64>>,
@@ -90,7 +93,7 @@ impl<T: Real> SceneEnergy<T> {
     /// If a length is not that of the scene, or a scene does not pass [`check`](Self::check): these are errors of the
     /// calling code, not of its input.
     pub fn evaluate(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
-        self.run(posed, canonical, Selection::Weighted, true, None)
+        self.run(posed, canonical, is_weighted, true, None)
     }
 
     /// The same, for positions that are near those of earlier calls with the same `memory`.
@@ -98,7 +101,7 @@ impl<T: Real> SceneEnergy<T> {
     /// # Panics
     /// As [`evaluate`](Self::evaluate).
     pub(crate) fn evaluate_near(&self, posed: &[[T; 3]], memory: &mut BodyMemory) -> SceneValue<T> {
-        self.run(posed, &[], Selection::Weighted, true, Some(memory))
+        self.run(posed, &[], is_weighted, true, Some(memory))
     }
 
     /// The same value, without gradients.
@@ -106,7 +109,7 @@ impl<T: Real> SceneEnergy<T> {
     /// # Panics
     /// As [`evaluate`](Self::evaluate).
     pub fn value(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
-        self.run(posed, canonical, Selection::Weighted, false, None)
+        self.run(posed, canonical, is_weighted, false, None)
     }
 
     /// All raw values, whatever the weights, without gradients: what a score reports. A garment that is not held has no
@@ -115,99 +118,78 @@ impl<T: Real> SceneEnergy<T> {
     /// # Panics
     /// As [`evaluate`](Self::evaluate).
     pub fn raw(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
-        self.run(posed, canonical, Selection::All, false, None)
+        self.run(posed, canonical, |_| true, false, None)
     }
 
+    /// Evaluates the terms with weights that are active, as far as there is input for them.
     fn run(
         &self,
         posed: &[[T; 3]],
         canonical: &[[T; 3]],
-        selection: Selection,
+        is_active: fn(f64) -> bool,
         with_gradient: bool,
         memory: Option<&mut BodyMemory>,
     ) -> SceneValue<T> {
         let count = self.vertex_count();
         assert_eq!(posed.len(), count, "posed positions of all garments of the scene");
         assert!(
-            canonical.len() == count
-                || canonical.is_empty() && (selection == Selection::All || !self.needs_canonical()),
+            canonical.len() == count || canonical.is_empty() && (is_active(0.0) || !self.needs_canonical()),
             "{} canonical positions for the {count} vertices of the scene",
             canonical.len()
         );
-        let is_active = |_: Term, weight: f64| match selection {
-            Selection::Weighted => weight != 0.0,
-            Selection::All => true,
-        };
         let shared: Vec<Shared<'_, T>> = self
             .ranges()
             .into_par_iter()
             .zip(memories(memory, self.garments.len()))
             .enumerate()
             .map(|(i, (range, near))| {
-                self.share(i, &posed[range.clone()], canonical.get(range).unwrap_or(&[]), &is_active, near)
+                self.share(i, &posed[range.clone()], canonical.get(range).unwrap_or(&[]), is_active, near)
             })
             .collect();
 
-        let gradient_count = if with_gradient { count } else { 0 };
-        let mut posed_gradient = vec![vec3::zero(); gradient_count];
-        let mut canonical_gradient = vec![vec3::zero(); gradient_count];
-        let garments: Vec<TermMap<Option<f64>>> = self
+        let garments: Vec<GarmentValue<T>> = self
             .garments
             .par_iter()
             .zip(&shared)
-            .zip(self.split(&mut posed_gradient))
-            .zip(self.split(&mut canonical_gradient))
-            .map(|(((garment, shared), mut posed_gradient), mut canonical_gradient)| {
-                let mut raw = TermMap::default();
+            .map(|(garment, shared)| {
+                let zeros = || with_gradient.then(|| vec![vec3::zero(); shared.state.posed.len()]);
+                let mut value = GarmentValue { raw: TermMap::default(), posed: zeros(), canonical: zeros() };
                 for (term, energy) in garment.energies.terms() {
                     let weight = garment.weights[term];
                     let is_canonical = garment.is_canonical(term);
-                    if !is_active(term, weight) || is_canonical && canonical.is_empty() {
+                    if !is_active(weight) || is_canonical && canonical.is_empty() {
                         continue;
                     }
-                    let space = if is_canonical { &mut canonical_gradient } else { &mut posed_gradient };
+                    let space = if is_canonical { &mut value.canonical } else { &mut value.posed };
                     let target = space.as_deref_mut().map(|gradient| Weighted { weight, gradient });
-                    raw[term] = Some(energy.evaluate(&shared.state(), target));
+                    value.raw[term] = Some(energy.evaluate(&shared.state(), target));
                 }
-                raw
+                value
             })
             .collect();
+        let mut posed_gradient: Vec<[T; 3]> =
+            garments.iter().flat_map(|value| value.posed.iter().flatten()).copied().collect();
+        let canonical_gradient =
+            garments.iter().flat_map(|value| value.canonical.iter().flatten()).copied().collect();
 
         let pairs: Vec<PairValue<T>> =
-            self.layers.par_iter().map(|pair| self.pair(pair, &shared, &is_active, with_gradient)).collect();
-        if with_gradient {
-            let ranges = self.ranges();
-            for (pair, value) in self.layers.iter().zip(&pairs) {
-                let Some(gradients) = &value.gradients else { continue };
-                for (garment, gradient) in [pair.inner, pair.outer].into_iter().zip(gradients) {
-                    for (sum, g) in posed_gradient[ranges[garment].clone()].iter_mut().zip(gradient) {
-                        vec3::accumulate(sum, *g);
-                    }
+            self.layers.par_iter().map(|pair| self.pair(pair, &shared, is_active, with_gradient)).collect();
+        let ranges = self.ranges();
+        for (pair, value) in self.layers.iter().zip(&pairs) {
+            for (garment, gradient) in
+                [pair.inner, pair.outer].into_iter().zip(value.gradients.iter().flatten())
+            {
+                for (sum, g) in posed_gradient[ranges[garment].clone()].iter_mut().zip(gradient) {
+                    vec3::accumulate(sum, *g);
                 }
             }
         }
+        let garments: Vec<TermMap<Option<f64>>> = garments.into_iter().map(|value| value.raw).collect();
         let layers: Vec<TermMap<Option<f64>>> = pairs.into_iter().map(|pair| pair.raw).collect();
         let total =
             self.garments.iter().zip(&garments).map(|(g, raw)| weighted(&g.weights, raw)).sum::<f64>()
                 + self.layers.iter().zip(&layers).map(|(l, raw)| weighted(&l.weights, raw)).sum::<f64>();
         SceneValue { total, posed_gradient, canonical_gradient, garments, layers }
-    }
-
-    /// One slice per garment of a packed gradient; `None` for an empty one.
-    fn split<'g>(&self, mut gradient: &'g mut [[T; 3]]) -> Vec<Option<&'g mut [[T; 3]]>> {
-        let wanted = !gradient.is_empty();
-        let mut slices = Vec::with_capacity(self.garments.len());
-        for garment in &self.garments {
-            slices.push(if wanted {
-                let (head, tail) =
-                    std::mem::take(&mut gradient).split_at_mut(garment.energies.vertex_count());
-                gradient = tail;
-                Some(head)
-            } else {
-                None
-            });
-        }
-        slices
     }
 
     /// Everything that more than one term needs of garment `i`, each part only if an active term does.
@@ -216,16 +198,16 @@ impl<T: Real> SceneEnergy<T> {
         i: usize,
         posed: &'a [[T; 3]],
         canonical: &'a [[T; 3]],
-        is_active: &(impl Fn(Term, f64) -> bool + Sync),
+        is_active: fn(f64) -> bool,
         near: Option<&mut Vec<NearFaces>>,
     ) -> Shared<'a, T> {
         let garment = &self.garments[i];
         let in_pair = |term: Term, is_side: fn(&SceneLayers, usize) -> bool| {
-            self.layers.iter().any(|pair| is_side(pair, i) && is_active(term, pair.weights[term]))
+            self.layers.iter().any(|pair| is_side(pair, i) && is_active(pair.weights[term]))
         };
         let in_distance = in_pair(Term::LayerDistance, |pair, i| pair.inner == i || pair.outer == i);
         let is_inner = in_pair(Term::LayerCollision, |pair, i| pair.inner == i);
-        let needs_gaps = in_distance || is_active(Term::BodyCollision, garment.weights[Term::BodyCollision]);
+        let needs_gaps = in_distance || is_active(garment.weights[Term::BodyCollision]);
 
         let gaps = match needs_gaps {
             true => self.gaps(i, posed, in_distance, near),
@@ -283,7 +265,7 @@ impl<T: Real> SceneEnergy<T> {
         &self,
         pair: &SceneLayers,
         shared: &[Shared<'_, T>],
-        is_active: &(impl Fn(Term, f64) -> bool + Sync),
+        is_active: fn(f64) -> bool,
         with_gradient: bool,
     ) -> PairValue<T> {
         let (inner, outer) = (&shared[pair.inner], &shared[pair.outer]);
@@ -291,7 +273,7 @@ impl<T: Real> SceneEnergy<T> {
         let mut gradients = with_gradient.then(|| [zeros(inner), zeros(outer)]);
         let mut raw = TermMap::default();
         for (term, &weight) in pair.weights.iter() {
-            if !term.is_layer_term() || !is_active(term, weight) {
+            if !term.is_layer_term() || !is_active(weight) {
                 continue;
             }
             let targets = gradients

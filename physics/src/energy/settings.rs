@@ -142,7 +142,8 @@ impl EnergySettings {
     /// [`EnergyError::Setting`] names the first that is out of range.
     pub fn check(&self) -> Result<(), EnergyError> {
         let gate = self.layer_gate.unwrap_or_default();
-        let not_negative = [
+        let fail = |setting, value, expected| Err(EnergyError::Setting { setting, value, expected });
+        for (setting, value) in [
             ("material.density", self.material.density),
             ("material.mu", self.material.mu),
             ("material.lambda", self.material.lambda),
@@ -151,35 +152,30 @@ impl EnergySettings {
             ("layer_collision_epsilon", self.layer_collision_epsilon),
             ("gravity_acceleration", self.gravity_acceleration),
             ("layer_distance_radius", self.layer_distance_radius),
-        ];
-        for (setting, value) in not_negative {
+        ] {
             if !(value.is_finite() && value >= 0.0) {
-                return Err(EnergyError::Setting { setting, value, expected: "finite and not negative" });
+                return fail(setting, value, "finite and not negative");
             }
         }
-        let positive = [
+        for (setting, value) in [
             ("material.thickness", self.material.thickness),
             ("repulsion_radius", self.repulsion_radius),
             ("layer_gate.tangential_edges", gate.tangential_edges),
             ("layer_gate.depth", gate.depth),
-        ];
-        for (setting, value) in positive {
+        ] {
             if !(value.is_finite() && value > 0.0) {
-                return Err(EnergyError::Setting { setting, value, expected: "finite and greater than 0" });
+                return fail(setting, value, "finite and greater than 0");
             }
         }
         // Of an equilateral triangle it is 0.87: with as much, every triangle would count as a needle.
         if !(0.0..=0.5).contains(&self.needle_ratio) {
-            let (setting, value) = ("needle_ratio", self.needle_ratio);
-            return Err(EnergyError::Setting { setting, value, expected: "between 0 and 0.5" });
+            return fail("needle_ratio", self.needle_ratio, "between 0 and 0.5");
         }
         if !(0.0..=1.0).contains(&self.holding_fraction) {
-            let (setting, value) = ("holding_fraction", self.holding_fraction);
-            return Err(EnergyError::Setting { setting, value, expected: "between 0 and 1" });
+            return fail("holding_fraction", self.holding_fraction, "between 0 and 1");
         }
         if self.repulsion_subset == Some(0) {
-            let expected = "at least 1 partner per vertex, or left out for all pairs";
-            return Err(EnergyError::Setting { setting: "repulsion_subset", value: 0.0, expected });
+            return fail("repulsion_subset", 0.0, "at least 1 partner per vertex, or left out for all pairs");
         }
         Ok(())
     }

@@ -35,16 +35,7 @@ const NO_HEIGHT: f64 = 1e-12;
 /// it, which the contact's leaves out. All of it made the steps of the static solver five to ten times too short in the
 /// end, none of it makes them too long at first (iterations to within 1 mJ of the minimum from skinning, median of 13
 /// scenes: 29 with 1, 15 with 0.3, more than 40 with 0).
-pub const TENSION_SHARE: f64 = 0.3;
-
-/// Which rest triangles are too flat to be measured as they are.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Needle {
-    /// Least ratio of height to longest edge.
-    pub ratio: f64,
-    /// Of the whole garment (m).
-    pub median_edge: f64,
-}
+const TENSION_SHARE: f64 = 0.3;
 
 /// A rest triangle in a frame whose first axis is its longest edge, corner 0 → corner 1.
 #[derive(Debug, Clone, Copy)]
@@ -60,7 +51,8 @@ struct RestTriangle {
 }
 
 impl RestTriangle {
-    fn new(positions: &[[f64; 3]], face: [u32; 3], thickness: f64, needle: Needle) -> Self {
+    /// Taken to be no flatter than `ratio` of height to longest edge, which is taken for at least `shortest` (m).
+    fn new(positions: &[[f64; 3]], face: [u32; 3], thickness: f64, [ratio, shortest]: [f64; 2]) -> Self {
         let length = |k: usize| norm(sub(positions[face[(k + 1) % 3] as usize], positions[face[k] as usize]));
         let lengths = [length(0), length(1), length(2)];
         let first = (0..3).max_by(|&a, &b| lengths[a].total_cmp(&lengths[b])).unwrap_or(0);
@@ -75,8 +67,8 @@ impl RestTriangle {
         // Corners on a line have a height of rounding errors.
         let area = if true_height > NO_HEIGHT * true_length { area } else { 0.0 };
         let true_height = if area > 0.0 { true_height } else { 0.0 };
-        let length = true_length.max(needle.ratio * needle.median_edge);
-        let height = true_height.max(needle.ratio * length);
+        let length = true_length.max(shortest);
+        let height = true_height.max(ratio * length);
 
         let mut triangle = Self {
             corners,
@@ -167,11 +159,7 @@ impl RestTriangle {
 impl Strain {
     /// For a garment with rest shape `rest`; `needle_ratio` as in [`EnergySettings`](super::EnergySettings::needle_ratio).
     pub fn new(rest: &TriMesh, material: &Material, needle_ratio: f64) -> Self {
-        let median_edge = rest.median_edge_length();
-        Self::with_needle(rest, material, Needle { ratio: needle_ratio, median_edge })
-    }
-
-    pub(super) fn with_needle(rest: &TriMesh, material: &Material, needle: Needle) -> Self {
+        let needle = [needle_ratio, needle_ratio * rest.median_edge_length()];
         let triangles: Vec<RestTriangle> = rest
             .faces()
             .iter()

@@ -23,11 +23,9 @@ pub(super) struct Hessian {
 }
 
 impl Hessian {
-    pub fn new(problem: &Problem<'_>, posed: &[[f64; 3]]) -> Self {
-        let mut added = Pairs(Vec::new());
-        problem.curvature(posed, &mut added);
-        added.0.extend((0..problem.vertex_count() as u32).map(|v| [v, v]));
-        Self::with_blocks(problem.vertex_count(), added.0)
+    /// For `count` vertices: blocks get their place when they are first added to.
+    pub fn new(count: usize) -> Self {
+        Self::with_blocks(count, (0..count as u32).map(|v| [v, v]).collect())
     }
 
     /// Of `count` vertices with blocks for `pairs`, which may come twice.
@@ -108,11 +106,6 @@ impl Hessian {
         Some(direction)
     }
 
-    /// Where block `(row, column)`, `row ≤ column`, is among those of its row.
-    fn place(&self, [row, column]: [u32; 2]) -> Option<usize> {
-        self.blocks.row(row as usize).binary_search(&column).ok()
-    }
-
     /// Adds to the block at a place.
     #[inline(always)]
     fn add(&mut self, [row, column]: [u32; 2], place: usize, block: [[f64; 3]; 3]) {
@@ -125,17 +118,6 @@ impl Hessian {
                 true => (r..3).for_each(|c| values[start + c - r] += line[c]),
                 false => (0..3).for_each(|c| values[start + 3 * place - r + c] += line[c]),
             }
-        }
-    }
-}
-
-/// Which blocks are added, in order.
-struct Pairs(Vec<[u32; 2]>);
-
-impl CurvatureSink for Pairs {
-    fn add(&mut self, i: usize, j: usize, _: [[f64; 3]; 3]) {
-        if i != j {
-            self.0.push([i.min(j) as u32, i.max(j) as u32]);
         }
     }
 }
@@ -157,10 +139,9 @@ impl CurvatureSink for Blocks<'_> {
         if i == j {
             return self.hessian.add(pair, 0, block);
         }
-        let place = self.hessian.place(pair);
-        match place {
-            Some(place) => self.hessian.add(pair, place, block),
-            None => self.missing.push(pair),
+        match self.hessian.blocks.row(pair[0] as usize).binary_search(&pair[1]) {
+            Ok(place) => self.hessian.add(pair, place, block),
+            Err(_) => self.missing.push(pair),
         }
     }
 }

@@ -1,6 +1,5 @@
 //! A step length with Armijo's decrease.
 
-use super::solve::State;
 use crate::vec3::is_finite;
 
 /// Armijo: the share of the decrease that the slope at the start predicts. Half of it is what the minimum along the line has.
@@ -9,14 +8,24 @@ const DECREASE: f64 = 0.1;
 /// Most trials.
 const TRIALS: usize = 12;
 
+/// A state of the search.
+pub(super) struct SolverState {
+    /// Posed positions (m).
+    pub positions: Vec<[f64; 3]>,
+    /// Weighted sum of all energies there (J).
+    pub energy: f64,
+    /// Its gradient (N).
+    pub gradient: Vec<[f64; 3]>,
+}
+
 /// Tries lengths from 1 downwards from a state of `energy` and derivative `slope < 0` along the line. A trial that is
 /// too long is followed by the minimum of the parabola through value and slope at the start and the value of the trial,
 /// between a tenth and half of its length. Returns step length and state; `None` if no trial had the decrease.
 pub(super) fn search(
     energy: f64,
     slope: f64,
-    mut evaluate: impl FnMut(f64) -> State,
-) -> Option<(f64, State)> {
+    mut evaluate: impl FnMut(f64) -> SolverState,
+) -> Option<(f64, SolverState)> {
     let mut length = 1.0;
     for _ in 0..TRIALS {
         let trial = evaluate(length);

@@ -102,7 +102,7 @@ impl<'a> Problem<'a> {
 
     /// Passes a positive semidefinite approximation of the Hessian with respect to posed positions to `sink`.
     pub(super) fn curvature(&self, posed: &[[f64; 3]], sink: &mut dyn CurvatureSink) {
-        self.energy.curvature_near(posed, &[], sink, Some(&mut self.memory()));
+        self.energy.curvature(posed, &[], sink, Some(&mut self.memory()));
     }
 
     fn evaluate(&self, energy: &SceneEnergy<f64>, posed: &[[f64; 3]]) -> (f64, Vec<[f64; 3]>) {

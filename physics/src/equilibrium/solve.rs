@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::filtered_steps::{FilteredSteps, contact_mesh};
 use super::hessian::Hessian;
-use super::line_search::search;
+use super::line_search::{SolverState, search};
 use super::problem::relative;
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
 use crate::vec3::{add_scaled, distance_squared, dot, is_finite, norm_squared, sub};
@@ -39,17 +39,7 @@ const CREASE_WIDTH: (f64, [f64; 2]) = (0.01, [1e-7, 1e-3]);
 const WINDOW: usize = 10;
 
 /// Less than this share of all that was gained, in units of the tolerance, gained over [`WINDOW`] iterations, is no progress.
-const LEAST_GAIN: f64 = 1e-6;
-
-/// A state of the search.
-pub(super) struct State {
-    /// Posed positions (m).
-    pub positions: Vec<[f64; 3]>,
-    /// Weighted sum of all energies there (J).
-    pub energy: f64,
-    /// Its gradient (N).
-    pub gradient: Vec<[f64; 3]>,
-}
+const LEAST_PROGRESS: f64 = 1e-6;
 
 /// Lowers the energy of `problem` from posed positions `start` `[ΣV, 3]` (m) until it cannot or may not be lowered any
 /// more; [`Solution::stop`] says which. `observer` sees the start and every accepted step, and can end the search.
@@ -71,7 +61,7 @@ pub fn solve(
     problem.look_around(start);
     let mut step = Step { iteration: 0, energy: state.energy, displacement: 0.0, milliseconds: 0.0 };
     let mut force_scale = problem.force_scale(start);
-    let mut hessian = Hessian::new(problem, start);
+    let mut hessian = Hessian::new(problem.vertex_count());
     let mesh = settings.margin.map(|margin| (contact_mesh(problem.energy()), margin));
     let mut filter = mesh.as_ref().map(|(mesh, margin)| FilteredSteps::new(mesh, problem, start, *margin));
     let [mut shift, ..] = SHIFT;
@@ -118,7 +108,7 @@ pub fn solve(
                 reach = longest(&d);
                 let length = (settings.step_bound / reach).min(1.0);
                 let moved = state.positions.iter().zip(&d).map(|(p, d)| add_scaled(*p, length, *d));
-                let line = Line { problem, state: &state, to: moved.collect(), is_whole: length == 1.0 };
+                let line = StepLine { problem, state: &state, to: moved.collect(), is_whole: length == 1.0 };
                 match filter.as_mut() {
                     Some(filter) => line.advance_filtered(filter),
                     None => line.advance(),
@@ -163,18 +153,18 @@ pub fn solve(
 }
 
 /// Where a search for the next state begins, and where it goes at most.
-struct Line<'a> {
+struct StepLine<'a> {
     problem: &'a Problem<'a>,
-    state: &'a State,
+    state: &'a SolverState,
     to: Vec<[f64; 3]>,
     /// Whether that is as far as the model goes.
     is_whole: bool,
 }
 
-impl Line<'_> {
+impl StepLine<'_> {
     /// A lower state on the line, and the share of the decrease predicted by the slope that it has, 0 where it is not
     /// as far as the model goes; `None` where the line does not go downhill.
-    fn advance(&self) -> Option<(f64, State)> {
+    fn advance(&self) -> Option<(f64, SolverState)> {
         let Self { state, .. } = self;
         let moves: Vec<[f64; 3]> = self.to.iter().zip(&state.positions).map(|(q, p)| sub(*q, *p)).collect();
         let slope = product(&moves, &state.gradient);
@@ -186,7 +176,7 @@ impl Line<'_> {
                 || state.positions.iter().zip(&moves).map(|(p, d)| add_scaled(*p, length, *d)).collect();
             let positions = if length == 1.0 { self.to.clone() } else { part() };
             let (energy, gradient) = self.problem.value_and_gradient(&positions);
-            State { positions, energy, gradient }
+            SolverState { positions, energy, gradient }
         };
         let (length, next) = search(state.energy, slope, evaluate)?;
         let share = if length == 1.0 && self.is_whole { (next.energy - state.energy) / slope } else { 0.0 };
@@ -194,11 +184,11 @@ impl Line<'_> {
     }
 
     /// The same on what `filter` leaves of the line, which then has made the step.
-    fn advance_filtered(self, filter: &mut FilteredSteps<'_>) -> Option<(f64, State)> {
+    fn advance_filtered(self, filter: &mut FilteredSteps<'_>) -> Option<(f64, SolverState)> {
         let from = &self.state.positions;
         let mut to = self.to.clone();
         let before = filter.take(from, &mut to);
-        let line = Line { is_whole: self.is_whole && to == self.to, to, ..self };
+        let line = StepLine { is_whole: self.is_whole && to == self.to, to, ..self };
         let found = line.advance();
         match found {
             Some((_, next)) if next.positions != line.to => {
@@ -222,7 +212,7 @@ impl Line<'_> {
 }
 
 /// Whether the forces at `state`, compared with `scale`, balance within `tolerance`.
-fn is_balanced(problem: &Problem<'_>, state: &State, scale: f64, tolerance: f64) -> bool {
+fn is_balanced(problem: &Problem<'_>, state: &SolverState, scale: f64, tolerance: f64) -> bool {
     relative(problem.residual(&state.positions, &state.gradient), scale) <= tolerance
 }
 
@@ -231,10 +221,10 @@ fn is_progressing(history: &[Step], tolerance: f64) -> bool {
     let Some(earlier) = history.len().checked_sub(WINDOW + 1) else { return true };
     let energy = |i: usize| history[i].energy;
     let last = history.len() - 1;
-    energy(earlier) - energy(last) > LEAST_GAIN * tolerance * (energy(0) - energy(last))
+    energy(earlier) - energy(last) > LEAST_PROGRESS * tolerance * (energy(0) - energy(last))
 }
 
-fn first_state(problem: &Problem<'_>, start: &[[f64; 3]]) -> Result<State, EquilibriumError> {
+fn first_state(problem: &Problem<'_>, start: &[[f64; 3]]) -> Result<SolverState, EquilibriumError> {
     let (expected, found) = (problem.vertex_count(), start.len());
     if expected != found {
         return Err(EquilibriumError::Count { what: "start positions", expected, found });
@@ -246,7 +236,7 @@ fn first_state(problem: &Problem<'_>, start: &[[f64; 3]]) -> Result<State, Equil
     if !(energy.is_finite() && gradient.iter().all(|g| is_finite(*g))) {
         return Err(EquilibriumError::StartEnergy);
     }
-    Ok(State { positions: start.to_vec(), energy, gradient })
+    Ok(SolverState { positions: start.to_vec(), energy, gradient })
 }
 
 /// Scalar product over all coordinates, summed in order.

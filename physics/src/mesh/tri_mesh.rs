@@ -193,15 +193,7 @@ impl TriMesh {
 
     /// Smallest and largest coordinates over all vertices (m).
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
-        let mut low = [f64::INFINITY; 3];
-        let mut high = [f64::NEG_INFINITY; 3];
-        for position in &self.positions {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(position[axis]);
-                high[axis] = high[axis].max(position[axis]);
-            }
-        }
-        (low, high)
+        vec3::bounds(self.positions.iter().copied())
     }
 }
 

@@ -2,14 +2,16 @@
 
 use faer::Mat;
 
+use crate::mesh::DisjointSets;
 use crate::operators::lanczos::{Failure, dense_eigenpairs, smallest_eigenpairs};
 use crate::operators::{OperatorError, SparseMatrix};
+use crate::rows::CompressedRows;
 
 /// The smallest mass in the eigenvalue problem, relative to the mean mass of the component.
 const MASS_FLOOR: f64 = 1e-6;
 
 /// The smallest area of a component that has a basis, relative to the whole.
-const AREA_FLOOR: f64 = 1e-12;
+const COMPONENT_AREA_FLOOR: f64 = 1e-12;
 
 /// Components of up to this many vertices are solved densely.
 const DENSE_LIMIT: usize = 200;
@@ -40,31 +42,27 @@ pub struct Eigenbasis {
 /// # Errors
 /// [`OperatorError::Factorisation`] or [`OperatorError::NotConverged`], naming the component.
 pub fn eigenbasis(laplacian: &SparseMatrix, mass: &[f64], count: usize) -> Result<Eigenbasis, OperatorError> {
-    struct Pair {
-        value: f64,
-        component: usize,
-        column: usize,
-    }
     let components = members(laplacian, mass);
-    let mut pairs = Vec::new();
+    // Eigenvalue, component, column in its basis.
+    let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
     let mut bases = Vec::with_capacity(components.len());
     for vertices in &components {
         let (values, vectors) = component_basis(laplacian, mass, vertices, count)?;
         let component = bases.len();
-        pairs.extend(values.iter().enumerate().map(|(column, &value)| Pair { value, component, column }));
+        pairs.extend(values.iter().enumerate().map(|(column, &value)| (value, component, column)));
         bases.push(vectors);
     }
-    pairs.sort_by(|a, b| a.value.total_cmp(&b.value));
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     pairs.truncate(count);
 
     let mut values = vec![0.0; count];
     let mut vectors = vec![0.0; mass.len() * count];
-    for (target, pair) in pairs.iter().enumerate() {
-        values[target] = pair.value;
-        let basis = &bases[pair.component];
-        let sign = sign(basis.col_as_slice(pair.column));
-        for (row, &vertex) in components[pair.component].iter().enumerate() {
-            vectors[vertex as usize * count + target] = sign * basis[(row, pair.column)];
+    for (target, &(value, component, column)) in pairs.iter().enumerate() {
+        values[target] = value;
+        let basis = &bases[component];
+        let sign = sign(basis.col_as_slice(column));
+        for (row, &vertex) in components[component].iter().enumerate() {
+            vectors[vertex as usize * count + target] = sign * basis[(row, column)];
         }
     }
     Ok(Eigenbasis { values, vectors })
@@ -74,29 +72,16 @@ pub fn eigenbasis(laplacian: &SparseMatrix, mass: &[f64], count: usize) -> Resul
 ///
 /// Not those of the faces: a face collapsed to a point has no entries, and a vertex with only such faces hangs on nothing.
 fn members(laplacian: &SparseMatrix, mass: &[f64]) -> Vec<Vec<u32>> {
-    let smallest_area = AREA_FLOOR * mass.iter().sum::<f64>();
-    let mut seen = vec![false; mass.len()];
-    let mut components = Vec::new();
-    for seed in 0..mass.len() {
-        if std::mem::replace(&mut seen[seed], true) {
-            continue;
-        }
-        let mut vertices = vec![seed as u32];
-        let mut next = 0;
-        while next < vertices.len() {
-            for &neighbour in laplacian.row(vertices[next] as usize).0 {
-                if !std::mem::replace(&mut seen[neighbour as usize], true) {
-                    vertices.push(neighbour);
-                }
-            }
-            next += 1;
-        }
-        if vertices.iter().map(|&v| mass[v as usize]).sum::<f64>() > smallest_area {
-            vertices.sort_unstable();
-            components.push(vertices);
-        }
+    let smallest_area = COMPONENT_AREA_FLOOR * mass.iter().sum::<f64>();
+    let mut sets = DisjointSets::new(mass.len());
+    for vertex in 0..mass.len() {
+        laplacian.row(vertex).0.iter().for_each(|&neighbour| sets.join(vertex as u32, neighbour));
     }
-    components
+    let rooted: Vec<(usize, u32)> = (0..mass.len() as u32).map(|v| (sets.root(v) as usize, v)).collect();
+    let components = CompressedRows::grouped(mass.len(), rooted.into_iter());
+    let area = |vertices: &[u32]| vertices.iter().map(|&v| mass[v as usize]).sum::<f64>();
+    let all = (0..mass.len()).map(|lowest| components.row(lowest));
+    all.filter(|vertices| area(vertices) > smallest_area).map(<[u32]>::to_vec).collect()
 }
 
 /// Eigenvalues ascending and eigenvectors by column on one component.

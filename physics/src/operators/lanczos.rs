@@ -7,7 +7,6 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::linalg::matmul::matmul;
-use faer::prelude::IntoConst;
 use faer::{Accum, Col, Mat, MatRef, Par};
 
 use crate::mesh::shapes::SplitMix;
@@ -15,10 +14,10 @@ use crate::operators::SparseMatrix;
 use crate::operators::cholesky::Cholesky;
 
 /// Columns added per step: more than the multiplicity that a symmetric shape gives an eigenvalue (5 for an icosahedron).
-const BLOCK: usize = 8;
+const BLOCK_COLUMNS: usize = 8;
 
 /// A pair has converged at this residual of the inverted operator, relative to its eigenvalue there.
-const TOLERANCE: f64 = 1e-9;
+const RESIDUAL_TOLERANCE: f64 = 1e-9;
 
 /// Restarts with one shift. None or one are usual.
 const RESTART_LIMIT: usize = 8;
@@ -67,8 +66,8 @@ pub(super) fn smallest_eigenpairs(
     let mut residual = f64::INFINITY;
     for _ in 0..SHIFT_LIMIT {
         match with_shift(matrix, kernel, count, shift)? {
-            Outcome::Converged(vectors) => return Ok(rayleigh_quotients(matrix, vectors)),
-            Outcome::Stalled { largest_residual, last_eigenvalue } => {
+            LanczosOutcome::Converged(vectors) => return Ok(rayleigh_quotients(matrix, vectors)),
+            LanczosOutcome::Stalled { largest_residual, last_eigenvalue } => {
                 residual = largest_residual;
                 // A shift far above the wanted eigenvalues blurs them into one, one far below drowns them in rounding.
                 shift = if last_eigenvalue > 1e-6 * shift { last_eigenvalue / 8.0 } else { 1e-3 * shift };
@@ -78,7 +77,7 @@ pub(super) fn smallest_eigenpairs(
     Err(Failure::NotConverged(residual))
 }
 
-enum Outcome {
+enum LanczosOutcome {
     Converged(Mat<f64>),
     /// The restarts were used up; `last_eigenvalue` estimates the largest wanted one.
     Stalled {
@@ -87,38 +86,43 @@ enum Outcome {
     },
 }
 
-fn with_shift(matrix: &SparseMatrix, kernel: &[f64], count: usize, shift: f64) -> Result<Outcome, Failure> {
+fn with_shift(
+    matrix: &SparseMatrix,
+    kernel: &[f64],
+    count: usize,
+    shift: f64,
+) -> Result<LanczosOutcome, Failure> {
     let n = matrix.rows();
     let factor =
         Cholesky::new(&shifted(matrix, shift)).ok_or(Failure::Factorisation("the sparse factorisation"))?;
-    let capacity = (count * 5 / 2 + 6 * BLOCK).min(n - BLOCK);
+    let capacity = (count * 5 / 2 + 6 * BLOCK_COLUMNS).min(n - BLOCK_COLUMNS);
     // Each look at the Ritz values is a dense eigenvalue problem; it must stay rare against the steps between.
-    let between_checks = (count / 4).max(4 * BLOCK);
+    let between_checks = (count / 4).max(4 * BLOCK_COLUMNS);
     let mut space = Krylov::new(n, capacity, kernel, 1.0 / shift, |block| factor.solve_in_place(block));
-    let mut next_check = count + count / 2 + 2 * BLOCK;
+    let mut next_check = count + count / 2 + 2 * BLOCK_COLUMNS;
     let mut restarts = 0;
     loop {
         let rest = space.expand(|block| factor.solve_in_place(block));
-        let full = space.filled + BLOCK > capacity;
+        let full = space.filled + BLOCK_COLUMNS > capacity;
         if !full && space.filled < next_check {
             space.append(&rest.directions);
             continue;
         }
         next_check = space.filled + between_checks;
         let ritz = space.ritz(&rest.coupling, count).ok_or(Failure::Factorisation("Rayleigh–Ritz"))?;
-        if ritz.largest_residual <= TOLERANCE {
-            return Ok(Outcome::Converged(space.refined(&ritz, &rest, count)));
+        if ritz.largest_residual <= RESIDUAL_TOLERANCE {
+            return Ok(LanczosOutcome::Converged(space.refined(&ritz, &rest, count)));
         }
         if full {
             if restarts == RESTART_LIMIT {
-                return Ok(Outcome::Stalled {
+                return Ok(LanczosOutcome::Stalled {
                     largest_residual: ritz.largest_residual,
                     last_eigenvalue: 1.0 / ritz.values[count - 1].max(f64::MIN_POSITIVE) - shift,
                 });
             }
             restarts += 1;
             // Keeping some unwanted pairs makes the next cycle converge faster; it still gains a third of the space.
-            let kept = (count + count / 4 + BLOCK).min(capacity - 2 * BLOCK);
+            let kept = (count + count / 4 + BLOCK_COLUMNS).min(capacity - 2 * BLOCK_COLUMNS);
             space.restart(&ritz, kept);
             next_check = capacity;
         }
@@ -197,12 +201,7 @@ impl Krylov {
             space.basis[(i, 0)] = kernel[i];
         }
         space.projected[(0, 0)] = kernel_value;
-        let mut block = Mat::from_fn(n, BLOCK, |_, _| 0.0);
-        for j in 0..BLOCK {
-            for i in 0..n {
-                block[(i, j)] = space.random.symmetric();
-            }
-        }
+        let mut block = Mat::from_fn(n, BLOCK_COLUMNS, |_, _| space.random.symmetric());
         operator(block.as_mut());
         space.project_out(&mut block);
         let start = space.orthonormalise(block);
@@ -211,17 +210,17 @@ impl Krylov {
     }
 
     fn append(&mut self, block: &Mat<f64>) {
-        self.basis.as_mut().subcols_mut(self.filled, BLOCK).copy_from(block);
-        self.filled += BLOCK;
+        self.basis.as_mut().subcols_mut(self.filled, BLOCK_COLUMNS).copy_from(block);
+        self.filled += BLOCK_COLUMNS;
     }
 
     /// Applies the operator to the newest block, records its projection, and returns the rest.
     fn expand(&mut self, operator: impl Fn(faer::MatMut<'_, f64>)) -> ResidualBlock {
-        let start = self.filled - BLOCK;
-        let mut image = self.basis.as_ref().subcols(start, BLOCK).to_owned();
+        let start = self.filled - BLOCK_COLUMNS;
+        let mut image = self.basis.as_ref().subcols(start, BLOCK_COLUMNS).to_owned();
         operator(image.as_mut());
         let overlap = self.project_out(&mut image);
-        for j in 0..BLOCK {
+        for j in 0..BLOCK_COLUMNS {
             for i in 0..self.filled {
                 self.projected[(i, start + j)] = overlap[(i, j)];
                 self.projected[(start + j, i)] = overlap[(i, j)];
@@ -250,34 +249,20 @@ impl Krylov {
     /// direction) is replaced by a random new direction with coupling zero.
     fn orthonormalise(&mut self, mut block: Mat<f64>) -> ResidualBlock {
         let n = block.nrows();
-        let mut coupling = Mat::<f64>::zeros(BLOCK, BLOCK);
-        for j in 0..BLOCK {
+        let mut coupling = Mat::<f64>::zeros(BLOCK_COLUMNS, BLOCK_COLUMNS);
+        for j in 0..BLOCK_COLUMNS {
             let before = norm(&block, j);
-            for _ in 0..2 {
-                for i in 0..j {
-                    let overlap: f64 = dot(&block, i, j);
-                    coupling[(i, j)] += overlap;
-                    subtract(&mut block, i, j, overlap);
-                }
-            }
+            part_from_earlier(&mut block, j, |i, overlap| coupling[(i, j)] += overlap);
             let after = norm(&block, j);
             // What is left after cancelling twelve digits is rounding, not a direction.
             if after > 1e-12 * before && after > 1e-150 {
                 coupling[(j, j)] = after;
                 divide(&mut block, j, after);
             } else {
-                let mut fresh = Mat::<f64>::zeros(n, 1);
-                for i in 0..n {
-                    fresh[(i, 0)] = self.random.symmetric();
-                }
+                let mut fresh = Mat::from_fn(n, 1, |_, _| self.random.symmetric());
                 self.project_out(&mut fresh);
                 block.as_mut().col_mut(j).copy_from(fresh.col(0));
-                for _ in 0..2 {
-                    for i in 0..j {
-                        let overlap = dot(&block, i, j);
-                        subtract(&mut block, i, j, overlap);
-                    }
-                }
+                part_from_earlier(&mut block, j, |_, _| ());
                 let length = norm(&block, j).max(f64::MIN_POSITIVE);
                 divide(&mut block, j, length);
             }
@@ -288,7 +273,7 @@ impl Krylov {
         if removed > 1e-8 {
             self.project_out_once(&mut block);
         }
-        for j in 0..BLOCK {
+        for j in 0..BLOCK_COLUMNS {
             let length = norm(&block, j).max(f64::MIN_POSITIVE);
             divide(&mut block, j, length);
         }
@@ -301,7 +286,7 @@ impl Krylov {
         let (ascending, vectors) = dense_eigenpairs(self.projected.as_ref().submatrix(0, 0, size, size))?;
         let coefficients = Mat::from_fn(size, size, |i, j| vectors[(i, size - 1 - j)]);
         let values: Vec<f64> = ascending.into_iter().rev().collect();
-        let tail = coefficients.as_ref().submatrix(size - BLOCK, 0, BLOCK, count);
+        let tail = coefficients.as_ref().submatrix(size - BLOCK_COLUMNS, 0, BLOCK_COLUMNS, count);
         let residuals = coupling * tail;
         let largest_residual =
             (0..count).map(|j| norm(&residuals, j) / values[j].max(f64::MIN_POSITIVE)).fold(0.0, f64::max);
@@ -327,7 +312,7 @@ impl Krylov {
     /// right. The change is orthogonal to the space and as small as the residual, so orthonormality survives.
     fn refined(&self, ritz: &Ritz, rest: &ResidualBlock, count: usize) -> Mat<f64> {
         let mut vectors = self.combine(ritz, count);
-        let correction = Mat::from_fn(BLOCK, count, |i, j| ritz.residuals[(i, j)] / ritz.values[j]);
+        let correction = Mat::from_fn(BLOCK_COLUMNS, count, |i, j| ritz.residuals[(i, j)] / ritz.values[j]);
         matmul(vectors.as_mut(), Accum::Add, rest.directions.as_ref(), correction.as_ref(), 1.0, Par::Seq);
         vectors
     }
@@ -344,29 +329,21 @@ impl Krylov {
     }
 }
 
-fn column(matrix: &Mat<f64>, j: usize) -> &[f64] {
-    matrix.col_as_slice(j)
-}
-
 fn norm(matrix: &Mat<f64>, j: usize) -> f64 {
-    column(matrix, j).iter().map(|v| v * v).sum::<f64>().sqrt()
+    matrix.col_as_slice(j).iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
-fn dot(matrix: &Mat<f64>, i: usize, j: usize) -> f64 {
-    column(matrix, i).iter().zip(column(matrix, j)).map(|(a, b)| a * b).sum()
-}
-
-fn subtract(matrix: &mut Mat<f64>, i: usize, j: usize, factor: f64) {
-    let (from, mut to) = two_columns(matrix, i, j);
-    for row in 0..from.nrows() {
-        to[row] -= factor * from[row];
+/// Makes column `j` orthogonal to the earlier ones, twice, and reports how much of each was in it.
+fn part_from_earlier(block: &mut Mat<f64>, j: usize, mut removed: impl FnMut(usize, f64)) {
+    for _ in 0..2 {
+        for i in 0..j {
+            let earlier = block.col_as_slice(i).to_vec();
+            let column = block.col_as_slice_mut(j);
+            let overlap: f64 = earlier.iter().zip(&*column).map(|(a, b)| a * b).sum();
+            removed(i, overlap);
+            column.iter_mut().zip(&earlier).for_each(|(value, other)| *value -= overlap * other);
+        }
     }
-}
-
-fn two_columns(matrix: &mut Mat<f64>, i: usize, j: usize) -> (faer::ColRef<'_, f64>, faer::ColMut<'_, f64>) {
-    debug_assert!(i < j);
-    let (left, right) = matrix.as_mut().split_at_col_mut(j);
-    (left.into_const().col(i), right.col_mut(0))
 }
 
 fn divide(matrix: &mut Mat<f64>, j: usize, divisor: f64) {

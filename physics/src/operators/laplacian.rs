@@ -7,7 +7,7 @@ use crate::vec3;
 /// The smallest area a face counts as, relative to its longest edge squared: a height of 2·10⁻⁴ of that edge.
 ///
 /// A needle's cotangents grow without bound and would drown every other entry; with this floor they stay below 5,000.
-const AREA_FLOOR: f64 = 1e-4;
+const FACE_AREA_FLOOR: f64 = 1e-4;
 
 /// The cotangent Laplacian `[V, V]`, positive semidefinite, dimensionless: `xᵀ L x = ∫ |∇x|²` for the piecewise linear `x`.
 ///
@@ -21,7 +21,7 @@ pub fn cotangent_laplacian(mesh: &TriMesh) -> SparseMatrix {
         let [a, b, c] = mesh.corners(face);
         let edges = [vec3::sub(c, b), vec3::sub(a, c), vec3::sub(b, a)];
         let longest_squared = edges.iter().map(|e| vec3::norm_squared(*e)).fold(0.0, f64::max);
-        let area = mesh.face_area(face).max(AREA_FLOOR * longest_squared);
+        let area = mesh.face_area(face).max(FACE_AREA_FLOOR * longest_squared);
         if area < f64::MIN_POSITIVE {
             continue;
         }

@@ -17,22 +17,15 @@ impl SparseMatrix {
     pub fn from_triplets(rows: usize, columns_count: usize, mut triplets: Vec<(u32, u32, f64)>) -> Self {
         // A stable sort keeps the order of summation, hence every bit of the result.
         triplets.sort_by_key(|&(row, column, _)| (row, column));
-        let mut offsets = vec![0u32; rows + 1];
-        let mut columns: Vec<u32> = Vec::with_capacity(triplets.len());
-        let mut values: Vec<f64> = Vec::with_capacity(triplets.len());
-        let mut last = None;
-        for (row, column, value) in triplets {
-            assert!((row as usize) < rows && (column as usize) < columns_count, "entry outside the matrix");
-            if last == Some((row, column)) {
-                if let Some(sum) = values.last_mut() {
-                    *sum += value;
-                }
-            } else {
-                columns.push(column);
-                values.push(value);
-                offsets[row as usize + 1] += 1;
-                last = Some((row, column));
-            }
+        let is_inside =
+            |(row, column, _): &(u32, u32, f64)| (*row as usize) < rows && (*column as usize) < columns_count;
+        assert!(triplets.iter().all(is_inside), "entry outside the matrix");
+        let (mut offsets, mut columns, mut values) = (vec![0u32; rows + 1], Vec::new(), Vec::new());
+        for same_place in triplets.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let (row, column, first) = same_place[0];
+            columns.push(column);
+            values.push(same_place[1..].iter().fold(first, |sum, (.., value)| sum + value));
+            offsets[row as usize + 1] += 1;
         }
         for row in 0..rows {
             offsets[row + 1] += offsets[row];
@@ -76,6 +69,7 @@ impl SparseMatrix {
     }
 
     /// The entry at `(row, column)`, zero where none is stored.
+    #[cfg(test)]
     pub fn get(&self, row: usize, column: u32) -> f64 {
         let (columns, values) = self.row(row);
         columns.binary_search(&column).map_or(0.0, |at| values[at])

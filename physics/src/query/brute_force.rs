@@ -7,8 +7,6 @@ use crate::real::Real;
 use crate::rows::faces_at_vertices;
 use crate::vec3;
 
-pub use crate::query::winding_number::winding_number;
-
 /// Index and squared distance of the nearest point; the lowest index of several equally near. `(u32::MAX, ∞)` for no points.
 pub fn nearest<T: Real>(points: &[[T; 3]], p: [T; 3]) -> (u32, T) {
     let mut best = (u32::MAX, T::infinity());
@@ -70,4 +68,16 @@ pub fn gap(
             }
         }
     }
+}
+
+/// Generalised winding number of a surface about `p` (Jacobson, Kavan and Sorkine-Hornung 2013): the sum of the signed solid
+/// angles of its triangles (Van Oosterom and Strackee 1983) over 4π. For a closed surface it is a whole number: 0 outside, 1
+/// inside, 2 where two parts of the surface overlap.
+pub fn winding_number(positions: &[[f64; 3]], faces: &[[u32; 3]], p: [f64; 3]) -> f64 {
+    let half_angle = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|v| vec3::normalized(vec3::sub(positions[v as usize], p)));
+        let cosine = 1.0 + vec3::dot(a, b) + vec3::dot(b, c) + vec3::dot(c, a);
+        vec3::dot(a, vec3::cross(b, c)).atan2(cosine)
+    };
+    faces.iter().map(half_angle).sum::<f64>() / (2.0 * std::f64::consts::PI)
 }

@@ -5,12 +5,11 @@
 //! TVCG 2005). All of it is `f64`, whatever the caller's scalar: the sign must not depend on rounding.
 
 use parry3d_f64::bounding_volume::Aabb;
-use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 
 use super::pseudo_normal::PseudoNormals;
 use super::triangle_point::{Feature, TrianglePoint, box_distance_squared, closest_on_triangle};
-use super::triangle_tree::TriangleTree;
+use super::triangle_tree::{TriangleTree, triangle_box};
 use crate::rows::{CompressedRows, faces_at_vertices};
 use crate::vec3;
 
@@ -32,7 +31,7 @@ pub struct SurfacePoint {
 }
 
 /// Below this distance (m) the direction from the closest point is rounding, and the pseudo-normal replaces it.
-const CONTACT_DISTANCE: f64 = 1e-10;
+const TOUCHING_DISTANCE: f64 = 1e-10;
 
 impl SurfacePoint {
     /// Whether `p`, the point that it is closest to, lies behind its pseudo-normal.
@@ -44,7 +43,7 @@ impl SurfacePoint {
     pub(crate) fn signed(&self, p: [f64; 3], is_inside: bool) -> (f64, [f64; 3]) {
         let length = self.distance_squared.sqrt();
         let sign = if is_inside { -1.0 } else { 1.0 };
-        let direction = match length > CONTACT_DISTANCE {
+        let direction = match length > TOUCHING_DISTANCE {
             true => vec3::scale(vec3::sub(p, self.position), sign / length),
             false => self.normal,
         };
@@ -53,6 +52,7 @@ impl SurfacePoint {
 }
 
 /// Accelerated closest-point queries on one fixed surface.
+#[derive(Debug)]
 pub struct ClosestPoint {
     positions: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
@@ -60,15 +60,6 @@ pub struct ClosestPoint {
     /// Leaf of the tree → face; none for one that is never closest.
     leaves: Vec<Option<u32>>,
     at_vertex: CompressedRows<u32>,
-}
-
-impl std::fmt::Debug for ClosestPoint {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("ClosestPoint")
-            .field("vertices", &self.positions.len())
-            .field("faces", &self.faces.len())
-            .finish_non_exhaustive()
-    }
 }
 
 impl ClosestPoint {
@@ -165,12 +156,6 @@ impl ClosestPoint {
         let normals = PseudoNormals { positions, faces, at_vertex };
         normals.at(face, feature)
     }
-}
-
-/// The smallest box around a triangle.
-fn triangle_box(corners: [[f64; 3]; 3]) -> Aabb {
-    let [a, b, c] = corners.map(Vector::from_array);
-    Aabb::new(a.min(b).min(c), a.max(b).max(c))
 }
 
 #[cfg(test)]

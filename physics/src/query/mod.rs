@@ -1,10 +1,10 @@
 //! Queries on points and surfaces: nearest vertex (kd-tree), closest surface point and intersecting triangles
-//! (bounding-volume tree), winding numbers, and their oracles.
+//! (bounding-volume tree), winding numbers of closed surfaces.
 
-pub mod brute_force;
+#[cfg(test)]
+pub(crate) mod brute_force;
 mod closest_point;
 mod closest_vertex;
-pub mod grid_oracle;
 pub(crate) mod near_faces;
 mod pseudo_normal;
 mod ray_intersections;
@@ -13,7 +13,6 @@ pub(crate) mod triangle_pair;
 mod triangle_point;
 pub(crate) mod triangle_tree;
 mod union;
-mod winding_number;
 
 pub use closest_point::{ClosestPoint, SurfacePoint};
 pub use closest_vertex::VertexIndex;
@@ -21,4 +20,3 @@ pub use surface::{Distance, Gap, Surface};
 pub use triangle_point::Feature;
 pub(crate) use triangle_point::closest_on_triangle;
 pub use union::{FaceSide, UnionDistance};
-pub use winding_number::{winding_number, winding_numbers};

@@ -14,10 +14,10 @@ use super::triangle_point::TrianglePoint;
 use crate::vec3::{dot, norm, sub};
 
 /// Faces this much farther away than the closest one are remembered (m): about an edge of a body.
-const SLACK: f64 = 0.01;
+const REMEMBERED_BEYOND: f64 = 0.01;
 
 /// Most faces that are remembered of one point.
-const MOST: usize = 32;
+const MOST_FACES: usize = 32;
 
 /// Most sides that are remembered of one point.
 const MOST_SIDES: usize = 16;
@@ -26,7 +26,7 @@ const MOST_SIDES: usize = 16;
 const SAME_DIRECTION: f64 = 0.99985;
 
 /// A distance this much less (m) is as large.
-const ROUNDING: f64 = 1e-9;
+const EQUAL_DISTANCE: f64 = 1e-9;
 
 /// What is remembered of one point.
 #[derive(Debug, Clone)]
@@ -40,12 +40,12 @@ pub(crate) struct NearFaces {
     /// The signed distance was at least this there, if known (m).
     clear: f64,
     /// The last point seen of every direction of the gradient, latest first.
-    seen: Vec<Side>,
+    seen: Vec<SeenSide>,
 }
 
 /// The linear function that a distance follows near a point.
 #[derive(Debug, Clone, Copy)]
-struct Side {
+struct SeenSide {
     /// The point (m).
     at: [f64; 3],
     /// Signed distance there (m).
@@ -74,7 +74,7 @@ impl NearFaces {
         if self.seen.first().is_none_or(|side| side.at != p) {
             self.seen.retain(|side| !is_same_way(side.gradient, gradient));
             self.seen.truncate(MOST_SIDES - 1);
-            self.seen.insert(0, Side { at: p, distance, gradient });
+            self.seen.insert(0, SeenSide { at: p, distance, gradient });
         }
     }
 
@@ -88,7 +88,7 @@ impl NearFaces {
         let extended = near.map(|side| (side.distance + dot(side.gradient, sub(p, side.at)), side));
         let mut others: Vec<_> = extended
             .filter(|(distance, side)| {
-                !is_same_way(side.gradient, here.gradient) && *distance >= here.distance - ROUNDING
+                !is_same_way(side.gradient, here.gradient) && *distance >= here.distance - EQUAL_DISTANCE
             })
             .filter(|(distance, _)| *distance <= here.distance + band)
             .map(|(distance, side)| (distance, side.gradient))
@@ -107,13 +107,13 @@ impl NearFaces {
         let distance = found.distance_squared.sqrt();
         let seen = std::mem::take(&mut self.seen);
         *self = Self { at: p, beyond: distance, seen, ..Self::default() };
-        if distance <= reach + SLACK {
-            self.beyond = distance + SLACK;
+        if distance <= reach + REMEMBERED_BEYOND {
+            self.beyond = distance + REMEMBERED_BEYOND;
             self.faces = surface.faces_within(p, self.beyond);
             self.faces.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            if let Some(&(next, _)) = self.faces.get(MOST) {
+            if let Some(&(next, _)) = self.faces.get(MOST_FACES) {
                 self.beyond = next;
-                self.faces.truncate(MOST);
+                self.faces.truncate(MOST_FACES);
             }
         }
         Some(found)

@@ -1,7 +1,7 @@
 //! Winding numbers of closed surfaces, by the faces that a ray intersects.
 
 use crate::rows::CompressedRows;
-use crate::vec3::{cross, dot, sub};
+use crate::vec3::{bounds, cross, dot, sub};
 
 /// Cells of the grid for each face, at most…
 const CELLS_PER_FACE: f64 = 0.5;
@@ -16,14 +16,37 @@ const ENTRIES_PER_FACE: usize = 16;
 pub(super) struct RayIntersections {
     positions: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
-    columns: Columns,
+    /// Sides of a grid over y and z. Built in O(F), where a tree takes O(F log F): every body in another pose asks a few hundred
+    /// questions only.
+    axes: [GridAxis; 2],
+    /// The faces whose boxes touch every cell.
+    cells: CompressedRows<u32>,
 }
 
 impl RayIntersections {
     /// `positions` `[V, 3]` (m), `faces` `[F, 3]` whose corners are finite.
     pub fn new(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Self {
-        let columns = Columns::new(&positions, &faces);
-        Self { positions, faces, columns }
+        let boxes: Vec<([f64; 3], [f64; 3])> =
+            faces.iter().map(|face| bounds(face.map(|v| positions[v as usize]))).collect();
+        let (low, high) = bounds(boxes.iter().flat_map(|(low, high)| [*low, *high]));
+        let [long, wide] = [1, 2].map(|k| (high[k] - low[k]).max(0.0));
+        let mut cells = CELLS_PER_FACE * faces.len() as f64;
+        loop {
+            // Square cells where both sides have a length.
+            let side = (long * wide / cells).sqrt();
+            let count = |length: f64| ((length / side) as usize).clamp(1, cells.max(1.0) as usize);
+            let axis = |k: usize, length| GridAxis { low: low[k], high: high[k], count: count(length) };
+            let axes = [axis(1, long), axis(2, wide)];
+            let ranges = |(low, high): &([f64; 3], [f64; 3])| {
+                [0, 1].map(|k| [low, high].map(|corner| axes[k].cell(corner[k + 1])))
+            };
+            let touched = |b: &_| ranges(b).iter().map(|[from, to]| to - from + 1).product::<usize>();
+            if cells <= 1.0 || boxes.iter().map(touched).sum::<usize>() <= ENTRIES_PER_FACE * faces.len() {
+                let cells = filled(&axes, boxes.iter().map(ranges));
+                return Self { positions, faces, axes, cells };
+            }
+            cells *= 0.25;
+        }
     }
 
     /// `[V, 3]` (m).
@@ -44,7 +67,10 @@ impl RayIntersections {
 
     /// How many parts `p` is inside of, where none is inside out. In O(faces along the ray).
     pub fn winding_number(&self, p: [f64; 3]) -> i32 {
-        self.columns.at(p).iter().map(|&face| self.turns(self.faces[face as usize], p)).sum()
+        // The faces in the cell of `p`, among them all whose box it is in.
+        let [row, column] = [0, 1].map(|k| self.axes[k].cell(p[k + 1]));
+        let faces = self.cells.row(row * self.axes[1].count + column);
+        faces.iter().map(|&face| self.turns(self.faces[face as usize], p)).sum()
     }
 
     /// 1 where the ray from `p` leaves through `face`, −1 where it enters, 0 where it misses.
@@ -75,24 +101,15 @@ fn is_left(a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> bool {
     (b[1] - a[1]) * (p[2] - a[2]) - (p[1] - a[1]) * (b[2] - a[2]) > 0.0
 }
 
-/// The faces of a surface by the cells of a grid over y and z that their boxes touch. Built in O(F), where a tree takes
-/// O(F log F): every body in another pose asks a few hundred questions only.
-#[derive(Debug)]
-struct Columns {
-    axes: [Axis; 2],
-    /// The faces of every cell.
-    faces: CompressedRows<u32>,
-}
-
 /// One side of the grid.
 #[derive(Clone, Copy, Debug)]
-struct Axis {
+struct GridAxis {
     low: f64,
     high: f64,
     count: usize,
 }
 
-impl Axis {
+impl GridAxis {
     /// The cell of `x`, ascending with it whatever the rounding; the first or last one outside.
     fn cell(&self, x: f64) -> usize {
         // The cast takes what is negative, or no number, to 0.
@@ -101,57 +118,17 @@ impl Axis {
     }
 }
 
-impl Columns {
-    fn new(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Self {
-        let boxes: Vec<[[f64; 2]; 2]> = faces
-            .iter()
-            .map(|face| {
-                [1, 2].map(|k| {
-                    let corners = face.map(|v| positions[v as usize][k]);
-                    [
-                        corners.into_iter().fold(f64::INFINITY, f64::min),
-                        corners.into_iter().fold(f64::NEG_INFINITY, f64::max),
-                    ]
-                })
-            })
-            .collect();
-        let bounds = [0, 1].map(|k| {
-            boxes.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], b| {
-                [low.min(b[k][0]), high.max(b[k][1])]
-            })
-        });
-        let [long, wide] = bounds.map(|[low, high]| (high - low).max(0.0));
-        let mut cells = CELLS_PER_FACE * faces.len() as f64;
-        loop {
-            // Square cells where both sides have a length.
-            let side = (long * wide / cells).sqrt();
-            let count = |length: f64| ((length / side) as usize).clamp(1, cells.max(1.0) as usize);
-            let axis = |[low, high]: [f64; 2], length| Axis { low, high, count: count(length) };
-            let axes = [axis(bounds[0], long), axis(bounds[1], wide)];
-            let ranges = |b: &[[f64; 2]; 2]| [0, 1].map(|k| b[k].map(|x| axes[k].cell(x)));
-            let touched =
-                |b: &[[f64; 2]; 2]| ranges(b).iter().map(|[from, to]| to - from + 1).product::<usize>();
-            if cells <= 1.0 || boxes.iter().map(touched).sum::<usize>() <= ENTRIES_PER_FACE * faces.len() {
-                return Self::filled(axes, boxes.iter().map(ranges));
-            }
-            cells *= 0.25;
-        }
-    }
-
-    /// `ranges`: first and last cell of every face along both axes.
-    fn filled(axes: [Axis; 2], ranges: impl Iterator<Item = [[usize; 2]; 2]> + Clone) -> Self {
-        let cells = |[[low, high], [left, right]]: [[usize; 2]; 2]| {
-            (low..=high).flat_map(move |row| (left..=right).map(move |column| row * axes[1].count + column))
-        };
-        let keyed = (0u32..).zip(ranges).flat_map(|(face, range)| cells(range).map(move |cell| (cell, face)));
-        Self { axes, faces: CompressedRows::grouped(axes[0].count * axes[1].count, keyed) }
-    }
-
-    /// The faces in the cell of `p`, among them all whose box it is in.
-    fn at(&self, p: [f64; 3]) -> &[u32] {
-        let [row, column] = [0, 1].map(|k| self.axes[k].cell(p[k + 1]));
-        self.faces.row(row * self.axes[1].count + column)
-    }
+/// The faces of every cell; `ranges`: first and last cell of every face along both axes.
+fn filled(
+    axes: &[GridAxis; 2],
+    ranges: impl Iterator<Item = [[usize; 2]; 2]> + Clone,
+) -> CompressedRows<u32> {
+    let wide = axes[1].count;
+    let cells = |[[low, high], [left, right]]: [[usize; 2]; 2]| {
+        (low..=high).flat_map(move |row| (left..=right).map(move |column| row * wide + column))
+    };
+    let keyed = (0u32..).zip(ranges).flat_map(|(face, range)| cells(range).map(move |cell| (cell, face)));
+    CompressedRows::grouped(axes[0].count * wide, keyed)
 }
 
 #[cfg(test)]
@@ -205,7 +182,7 @@ mod tests {
         assert_eq!(rays.winding_number([0.3, 0.2, 0.1]), 401);
         assert_eq!(rays.winding_number([0.3, 0.2, 0.2]), 400);
         assert_eq!(rays.winding_number([100.0, 0.2, 0.1]), 0);
-        let cells = &rays.columns.faces;
+        let cells = &rays.cells;
         assert!(cells.range(cells.len() - 1).end <= ENTRIES_PER_FACE * mesh.faces().len());
     }
 

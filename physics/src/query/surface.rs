@@ -132,10 +132,10 @@ impl<T: Real> Surface<T> {
 
     /// Signed distance of `p` with its gradient. All NaN for a `p` that is not finite.
     pub fn gap(&self, p: [T; 3], distance: Distance) -> Gap<T> {
-        match distance {
-            Distance::NearestVertex => self.nearest_vertex_gap(p),
-            Distance::ClosestPoint => self.closest_point_gap(p),
-            Distance::Union => self.union_gap(p),
+        let Some(tree) = self.tree(distance) else { return self.nearest_vertex_gap(p) };
+        match tree.project(vec3::to_f64(p)) {
+            Some(found) => self.gap_to(p, &found, distance),
+            None => not_a_gap(),
         }
     }
 
@@ -143,14 +143,12 @@ impl<T: Real> Surface<T> {
     /// one, with no gradient.
     pub(crate) fn gap_within(&self, p: [T; 3], distance: Distance, reach: f64) -> Gap<T> {
         let q = vec3::to_f64(p);
-        if distance == Distance::Union && self.is_closed() && vec3::is_finite(q) {
+        if self.is_continuous(distance) && vec3::is_finite(q) {
             let union = self.union_distance();
             match union.kept().project_within(q, reach) {
-                Some(found) => return signed_gap(p, &found, union.is_inside(q, &found), union.kept()),
+                Some(found) => return self.gap_to(p, &found, distance),
                 // A winding number costs less than a distance.
-                None if union.winding_number(q) < 1 && !union.kept().is_empty() => {
-                    return Gap { gap: T::from_f64(reach), gradient: vec3::zero(), vertex: 0 };
-                }
+                None if union.winding_number(q) < 1 && !union.kept().is_empty() => return clear_gap(reach),
                 None => (),
             }
         }
@@ -164,33 +162,49 @@ impl<T: Real> Surface<T> {
         let Some(tree) = self.tree(distance).filter(|_| vec3::is_finite(q)) else {
             return self.gap(p, distance);
         };
-        // Other distances jump where the body overlaps itself or ends, however far away it is.
-        let is_continuous = distance == Distance::Union && self.is_closed();
         let clearance = near.clearance(q);
-        if is_continuous && clearance >= reach {
-            return Gap { gap: T::from_f64(clearance), gradient: vec3::zero(), vertex: 0 };
+        if self.is_continuous(distance) && clearance >= reach {
+            return clear_gap(clearance);
         }
         let Some(found) = near.project(tree, q, reach) else { return not_a_gap() };
-        let gap = signed_gap(p, &found, self.is_inside(q, &found, distance), tree);
+        let gap = self.gap_to(p, &found, distance);
         near.see(q, gap.gap.to_f64(), vec3::to_f64(gap.gradient));
         gap
     }
 
-    /// Whether `p`, to which `found` is the closest point of the [`tree`](Self::tree), is inside.
-    fn is_inside(&self, p: [f64; 3], found: &SurfacePoint, distance: Distance) -> bool {
-        match distance == Distance::Union && self.is_closed() {
-            true => self.union_distance().is_inside(p, found),
-            false => found.is_behind(p),
-        }
+    /// Whether a distance is continuous: others jump where the body overlaps itself or ends, however far away it is.
+    fn is_continuous(&self, distance: Distance) -> bool {
+        distance == Distance::Union && self.is_closed()
     }
 
     /// The faces that a distance is measured to; none where it is measured to vertices.
     fn tree(&self, distance: Distance) -> Option<&ClosestPoint> {
         match distance {
             Distance::NearestVertex => None,
+            // A ray through a hole would tell the whole body as buried.
             Distance::Union if self.is_closed() => Some(self.union_distance().kept()),
             Distance::ClosestPoint | Distance::Union => Some(self.closest_point()),
         }
+    }
+
+    /// The distance from `found`, the point closest to `p` on the faces of the [`tree`](Self::tree), with its sign.
+    fn gap_to(&self, p: [T; 3], found: &SurfacePoint, distance: Distance) -> Gap<T> {
+        let q = vec3::to_f64(p);
+        let is_inside = match self.is_continuous(distance) {
+            true => self.union_distance().is_inside(q, found),
+            false => found.is_behind(q),
+        };
+        let (gap, gradient) = found.signed(q, is_inside);
+        let corners = self.faces[found.face as usize];
+        let [a, b, c] = found.barycentric;
+        let vertex = if a >= b && a >= c {
+            corners[0]
+        } else if b >= c {
+            corners[1]
+        } else {
+            corners[2]
+        };
+        Gap { gap: T::from_f64(gap), gradient: vec3::from_f64(gradient), vertex }
     }
 
     /// The paper's form: `(p − x_b)·n_b`, gradient `n_b`.
@@ -203,38 +217,11 @@ impl<T: Real> Surface<T> {
         };
         Gap { gap: vec3::dot(vec3::sub(p, position), normal), gradient: normal, vertex }
     }
-
-    fn closest_point_gap(&self, p: [T; 3]) -> Gap<T> {
-        let Some(found) = self.project(p) else { return not_a_gap() };
-        signed_gap(p, &found, found.is_behind(vec3::to_f64(p)), self.closest_point())
-    }
-
-    fn union_gap(&self, p: [T; 3]) -> Gap<T> {
-        // A ray through a hole would tell the whole body as buried.
-        if !self.is_closed() {
-            return self.closest_point_gap(p);
-        }
-        let union = self.union_distance();
-        match union.project(vec3::to_f64(p)) {
-            Some((found, is_inside)) => signed_gap(p, &found, is_inside, union.kept()),
-            None => not_a_gap(),
-        }
-    }
 }
 
-/// The distance from `found`, the point of `tree` closest to `p`, with its sign.
-fn signed_gap<T: Real>(p: [T; 3], found: &SurfacePoint, is_inside: bool, tree: &ClosestPoint) -> Gap<T> {
-    let (gap, gradient) = found.signed(vec3::to_f64(p), is_inside);
-    let corners = tree.face(found.face);
-    let [a, b, c] = found.barycentric;
-    let vertex = if a >= b && a >= c {
-        corners[0]
-    } else if b >= c {
-        corners[1]
-    } else {
-        corners[2]
-    };
-    Gap { gap: T::from_f64(gap), gradient: vec3::from_f64(gradient), vertex }
+/// Of a point at least `distance` (m) away, where no gradient is asked for.
+fn clear_gap<T: Real>(distance: f64) -> Gap<T> {
+    Gap { gap: T::from_f64(distance), gradient: vec3::zero(), vertex: 0 }
 }
 
 fn not_a_gap<T: Real>() -> Gap<T> {

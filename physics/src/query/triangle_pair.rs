@@ -213,7 +213,7 @@ fn sides(plane: &Triangle, of: &Triangle) -> [f64; 3] {
 #[inline]
 fn surely_one_side(plane: &Triangle, of: &Triangle) -> bool {
     // A difference, two products, a difference, a product and two sums: at most 8 roundings of 2^-53 per term; 16 are taken.
-    const ROUNDING: f64 = 8.0 * f64::EPSILON;
+    const SIDE_ROUNDING: f64 = 8.0 * f64::EPSILON;
     let (u, v) = (vec3::sub(plane[1], plane[0]), vec3::sub(plane[2], plane[0]));
     let normal = vec3::cross(u, v);
     let sizes: [f64; 3] = std::array::from_fn(|k| {
@@ -223,7 +223,7 @@ fn surely_one_side(plane: &Triangle, of: &Triangle) -> bool {
     let (mut above, mut below) = (true, true);
     for &p in of {
         let w = vec3::sub(p, plane[0]);
-        let (height, slack) = (vec3::dot(normal, w), ROUNDING * vec3::dot(sizes, w.map(f64::abs)));
+        let (height, slack) = (vec3::dot(normal, w), SIDE_ROUNDING * vec3::dot(sizes, w.map(f64::abs)));
         above &= height > slack;
         below &= height < -slack;
     }
@@ -235,7 +235,7 @@ fn surely_one_side(plane: &Triangle, of: &Triangle) -> bool {
 #[inline]
 fn surely_parted_at_corner(a: &Triangle, b: &Triangle) -> bool {
     // A difference, a product and two sums: at most 5 roundings of 2^-53 per term; 16 are taken.
-    const ROUNDING: f64 = 8.0 * f64::EPSILON;
+    const CORNER_ROUNDING: f64 = 8.0 * f64::EPSILON;
     let edges = |t: &Triangle| [vec3::sub(t[1], t[0]), vec3::sub(t[2], t[0])];
     let (of_a, of_b) = (edges(a), edges(b));
     // Any normal will do; the one from the middle of b to that of a, both one long, is nearly always one that does.
@@ -246,7 +246,7 @@ fn surely_parted_at_corner(a: &Triangle, b: &Triangle) -> bool {
     let normal = vec3::sub(middle(of_a), middle(of_b));
     let sizes = normal.map(f64::abs);
     let is_over = |edge: &[f64; 3], sign: f64| {
-        sign * vec3::dot(normal, *edge) > ROUNDING * vec3::dot(sizes, edge.map(f64::abs))
+        sign * vec3::dot(normal, *edge) > CORNER_ROUNDING * vec3::dot(sizes, edge.map(f64::abs))
     };
     of_a.iter().all(|edge| is_over(edge, 1.0)) && of_b.iter().all(|edge| is_over(edge, -1.0))
 }
@@ -256,11 +256,11 @@ fn surely_parted_at_corner(a: &Triangle, b: &Triangle) -> bool {
 #[inline]
 fn surely_on_both_sides(a: &Triangle, apex: [f64; 3]) -> bool {
     // The cosine between the two heights, of vectors that are each right to a few roundings.
-    const ROUNDING: f64 = 64.0 * f64::EPSILON;
+    const FOLD_ROUNDING: f64 = 64.0 * f64::EPSILON;
     let [along, own, other] = [a[2], a[0], apex].map(|p| vec3::sub(p, a[1]));
     let product = vec3::dot(vec3::cross(own, along), vec3::cross(other, along));
     let squares = vec3::norm_squared(own) * vec3::norm_squared(other) * vec3::norm_squared(along).powi(2);
-    product < 0.0 && product * product > ROUNDING * ROUNDING * squares && squares.is_finite()
+    product < 0.0 && product * product > FOLD_ROUNDING * FOLD_ROUNDING * squares && squares.is_finite()
 }
 
 #[inline]

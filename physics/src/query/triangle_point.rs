@@ -79,8 +79,7 @@ pub(crate) fn closest_on_triangle(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> Tria
 
 /// Closest point of the three edges; safe for edges of length zero.
 fn closest_on_edges(p: [f64; 3], corners: [[f64; 3]; 3]) -> TrianglePoint {
-    let mut best: Option<TrianglePoint> = None;
-    for edge in 0..3 {
+    let on_edge = |edge: usize| {
         let next = (edge + 1) % 3;
         let along = vec3::sub(corners[next], corners[edge]);
         let length_squared = vec3::norm_squared(along);
@@ -90,25 +89,20 @@ fn closest_on_edges(p: [f64; 3], corners: [[f64; 3]; 3]) -> TrianglePoint {
             0.0
         };
         let position = vec3::add_scaled(corners[edge], t, along);
+        let mut barycentric = [0.0; 3];
+        barycentric[edge] = 1.0 - t;
+        barycentric[next] = t;
+        let feature = match t {
+            0.0 => Feature::Vertex(edge),
+            1.0 => Feature::Vertex(next),
+            _ => Feature::Edge(edge),
+        };
         let distance_squared = vec3::distance_squared(p, position);
-        if best.is_none_or(|b| distance_squared < b.distance_squared) {
-            let mut barycentric = [0.0; 3];
-            barycentric[edge] = 1.0 - t;
-            barycentric[next] = t;
-            let feature = match t {
-                0.0 => Feature::Vertex(edge),
-                1.0 => Feature::Vertex(next),
-                _ => Feature::Edge(edge),
-            };
-            best = Some(TrianglePoint { position, distance_squared, barycentric, feature });
-        }
-    }
-    best.unwrap_or(TrianglePoint {
-        position: corners[0],
-        distance_squared: vec3::distance_squared(p, corners[0]),
-        barycentric: [1.0, 0.0, 0.0],
-        feature: Feature::Vertex(0),
-    })
+        TrianglePoint { position, distance_squared, barycentric, feature }
+    };
+    let nearer =
+        |a: TrianglePoint, b: TrianglePoint| if b.distance_squared < a.distance_squared { b } else { a };
+    nearer(nearer(on_edge(0), on_edge(1)), on_edge(2))
 }
 
 /// How far a point is from a box, squared; 0 inside.

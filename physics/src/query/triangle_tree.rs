@@ -13,6 +13,7 @@ use super::triangle_point::{box_distance_squared, closest_on_triangle};
 ///
 /// Faces that are no triangle take part in nothing: an index out of range, a corner that is not finite, or no area (corners
 /// exactly on one line, such as repeated positions).
+#[derive(Debug)]
 pub struct TriangleTree<'a> {
     positions: &'a [[f64; 3]],
     faces: &'a [[u32; 3]],
@@ -26,15 +27,6 @@ pub struct TriangleTree<'a> {
 pub(crate) struct KeptTree {
     bvh: Bvh,
     kept: Vec<u32>,
-}
-
-impl std::fmt::Debug for TriangleTree<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("TriangleTree")
-            .field("faces", &self.faces.len())
-            .field("skipped", &self.skipped())
-            .finish_non_exhaustive()
-    }
 }
 
 impl<'a> TriangleTree<'a> {
@@ -107,7 +99,11 @@ impl<'a> TriangleTree<'a> {
         if self.bvh.is_empty() || other.bvh.is_empty() {
             return Vec::new();
         }
-        decided(self.candidates(other), |(a, b)| {
+        let candidates = self
+            .bvh
+            .leaf_pairs(&other.bvh, |a, b| a.intersects(b))
+            .map(|(a, b)| (self.kept[a as usize], other.kept[b as usize]));
+        decided(candidates.collect(), |(a, b)| {
             self.triangle(a).zip(other.triangle(b)).is_some_and(|(a, b)| triangles_intersect(&a, &b))
         })
     }
@@ -124,19 +120,15 @@ impl<'a> TriangleTree<'a> {
         if self.bvh.is_empty() {
             return Vec::new();
         }
-        let mut pairs: Vec<(u32, u32)> = faces
-            .par_iter()
-            .with_min_len(256)
-            .flat_map_iter(|&f| {
-                let face = all_faces[f as usize];
-                let bounds = triangle_box(positions, face);
-                bounds
-                    .into_iter()
-                    .flat_map(move |bounds| self.faces_meeting(positions, (face, bounds, f), asked))
+        sorted_pairs(faces, |f| {
+            let triangle = corners(positions, all_faces[f as usize]).filter(has_area);
+            triangle.into_iter().flat_map(move |a| {
+                let meets = move |g: &u32| {
+                    asked(*g) && self.triangle(*g).is_some_and(|b| triangles_intersect(&a, &b))
+                };
+                self.faces_meeting(triangle_box(a)).filter(meets).map(move |g| (f, g))
             })
-            .collect();
-        pairs.sort_unstable();
-        pairs
+        })
     }
 
     /// Pairs of different faces of this mesh, smaller index first, that intersect beyond the vertices they share (see
@@ -158,32 +150,25 @@ impl<'a> TriangleTree<'a> {
         let mut takes_part = vec![false; self.faces.len()];
         faces.iter().for_each(|&f| takes_part[f as usize] = true);
         let takes_part = &takes_part;
-        // Two of them meet once, seen from the smaller one.
-        let is_asked = move |f: u32, g: u32| f < g || f > g && !takes_part[g as usize];
-        let mut pairs: Vec<(u32, u32)> = faces
-            .par_iter()
-            .with_min_len(256)
-            .flat_map_iter(|&f| {
-                self.faces_meeting_own(f, move |g| is_asked(f, g)).map(move |g| (f.min(g), f.max(g)))
-            })
-            .collect();
-        pairs.sort_unstable();
-        pairs
-    }
-
-    /// Faces of this mesh, of those `asked` for, that intersect its face `f`.
-    fn faces_meeting_own(&self, f: u32, asked: impl Fn(u32) -> bool) -> impl Iterator<Item = u32> {
-        let probe = triangle_box(self.positions, self.face(f)).map(|bounds| BvhNode::leaf(bounds, f));
-        let leaves =
-            probe.into_iter().flat_map(move |probe| self.bvh.leaves(move |node| node.intersects(&probe)));
-        leaves.map(move |leaf| self.kept[leaf as usize]).filter(move |&g| {
-            asked(g) && mesh_triangles_intersect(self.positions, self.face(f), self.face(g))
+        sorted_pairs(faces, |f| {
+            // Two of them meet once, seen from the smaller one.
+            let meets = move |g: &u32| {
+                (f < *g || f > *g && !takes_part[*g as usize])
+                    && mesh_triangles_intersect(self.positions, self.face(f), self.face(*g))
+            };
+            let triangle = self.triangle(f).filter(has_area);
+            let near = triangle.into_iter().flat_map(|a| self.faces_meeting(triangle_box(a)));
+            near.filter(meets).map(move |g| (f.min(g), f.max(g)))
         })
     }
 
     /// Faces whose box meets the box from `low` to `high`, in no particular order.
-    pub(crate) fn faces_in_box(&self, low: [f64; 3], high: [f64; 3]) -> impl Iterator<Item = u32> {
-        let probe = BvhNode::leaf(Aabb::new(Vector::from_array(low), Vector::from_array(high)), 0);
+    pub(crate) fn faces_in_box(&self, (low, high): ([f64; 3], [f64; 3])) -> impl Iterator<Item = u32> {
+        self.faces_meeting(Aabb::new(Vector::from_array(low), Vector::from_array(high)))
+    }
+
+    fn faces_meeting(&self, bounds: Aabb) -> impl Iterator<Item = u32> {
+        let probe = BvhNode::leaf(bounds, 0);
         self.bvh.leaves(move |node| node.intersects(&probe)).map(|leaf| self.kept[leaf as usize])
     }
 
@@ -205,32 +190,6 @@ impl<'a> TriangleTree<'a> {
             |leaf, _| distance_squared(leaf),
         )?;
         Some(nearest.sqrt())
-    }
-
-    /// Pairs of faces whose boxes meet, in no particular order.
-    fn candidates(&self, other: &TriangleTree) -> Vec<(u32, u32)> {
-        self.bvh
-            .leaf_pairs(&other.bvh, |a, b| a.intersects(b))
-            .map(|(a, b)| (self.kept[a as usize], other.kept[b as usize]))
-            .collect()
-    }
-
-    /// Pairs of one face of another mesh, with its box and index there, and the faces of this mesh, of those `asked` for, that
-    /// share a point with it.
-    fn faces_meeting(
-        &self,
-        positions: &[[f64; 3]],
-        (face, bounds, index): ([u32; 3], Aabb, u32),
-        asked: impl Fn(u32) -> bool,
-    ) -> impl Iterator<Item = (u32, u32)> {
-        let triangle = corners(positions, face);
-        let probe = BvhNode::leaf(bounds, index);
-        self.bvh.leaves(move |node| node.intersects(&probe)).filter_map(move |leaf| {
-            let other = self.kept[leaf as usize];
-            let meet = asked(other)
-                && triangle.zip(self.triangle(other)).is_some_and(|(a, b)| triangles_intersect(&a, &b));
-            meet.then_some((index, other))
-        })
     }
 
     /// Corner indices of a face of the tree.
@@ -260,15 +219,8 @@ pub fn triangle_pairs(
         return Vec::new();
     };
     let b = TriangleTree::of_part(b_positions, b_faces, |_, bounds| region.intersects(bounds));
-    let mut pairs: Vec<(u32, u32)> = boxes
-        .par_iter()
-        .with_min_len(256)
-        .flat_map_iter(|&(face, bounds)| {
-            b.faces_meeting(a_positions, (a_faces[face as usize], bounds, face), |_| true)
-        })
-        .collect();
-    pairs.sort_unstable();
-    pairs
+    let faces: Vec<u32> = boxes.into_iter().map(|(face, _)| face).collect();
+    b.pairs_of_faces(a_positions, a_faces, &faces, |_| true)
 }
 
 /// Pairs of faces of one mesh that intersect beyond the vertices they share: [`TriangleTree::self_pairs`].
@@ -278,13 +230,25 @@ pub fn self_triangle_pairs(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<(u
 
 /// Every face that is a triangle, with its box.
 fn triangle_boxes(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<(u32, Aabb)> {
-    (0u32..).zip(faces).filter_map(|(index, &face)| Some((index, triangle_box(positions, face)?))).collect()
+    let bounds = |face: [u32; 3]| Some(triangle_box(corners(positions, face).filter(has_area)?));
+    (0u32..).zip(faces).filter_map(|(index, &face)| Some((index, bounds(face)?))).collect()
 }
 
-/// The box of a face, if it is a triangle.
-fn triangle_box(positions: &[[f64; 3]], face: [u32; 3]) -> Option<Aabb> {
-    let [a, b, c] = corners(positions, face).filter(has_area)?.map(Vector::from_array);
-    Some(Aabb::new(a.min(b).min(c), a.max(b).max(c)))
+/// The smallest box around a triangle.
+pub(super) fn triangle_box(triangle: Triangle) -> Aabb {
+    let [a, b, c] = triangle.map(Vector::from_array);
+    Aabb::new(a.min(b).min(c), a.max(b).max(c))
+}
+
+/// The pairs `found` for some faces, in ascending order.
+fn sorted_pairs<I: Iterator<Item = (u32, u32)>>(
+    faces: &[u32],
+    found: impl Fn(u32) -> I + Sync,
+) -> Vec<(u32, u32)> {
+    let mut pairs: Vec<(u32, u32)> =
+        faces.par_iter().with_min_len(256).flat_map_iter(|&f| found(f)).collect();
+    pairs.sort_unstable();
+    pairs
 }
 
 /// Those of `candidates` that `intersect`, in ascending order.

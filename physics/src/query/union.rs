@@ -18,7 +18,7 @@ use crate::rows::faces_at_vertices;
 use crate::vec3::{self, add, add_scaled, dot, normalized, scale, sub};
 
 /// How far outside a triangle the side of its piece is asked for (m).
-const LOOK_OUT: f64 = 1e-8;
+const FACE_LOOK_OUT: f64 = 1e-8;
 /// Rings of faces where a part of a surface ends that may intersect what does not belong to it.
 const END_RINGS: usize = 2;
 
@@ -165,7 +165,7 @@ fn exposed(all: &RayIntersections, faces: &[[u32; 3]], is_seam: &[bool], is_isol
             let face = faces[largest[piece]];
             let [a, b, c] = all.corners(face);
             let centre = scale(add(add(a, b), c), 1.0 / 3.0);
-            let before = add_scaled(centre, LOOK_OUT, normalized(all.normal(face)));
+            let before = add_scaled(centre, FACE_LOOK_OUT, normalized(all.normal(face)));
             all.winding_number(before) == 0
         })
         .collect();

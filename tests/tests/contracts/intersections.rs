@@ -13,9 +13,12 @@ use clothcombo_physics::contact::{
 };
 use clothcombo_physics::mesh::TriMesh;
 use clothcombo_physics::query::Distance;
-use clothcombo_physics::query::grid_oracle::{self, GridPoint};
+use grid_oracle::GridPoint;
 use rayon::prelude::*;
 use std::path::Path;
+
+#[path = "../../../physics/src/contact/tests/grid_oracle.rs"]
+mod grid_oracle;
 
 const GRID: f64 = (1u32 << 20) as f64;
 

@@ -2,45 +2,11 @@
 
 use std::cell::OnceCell;
 
-use super::Layer;
-use super::clearance::{Before, Clearance, YieldedBody};
-use super::garment::triangles;
-use super::near::near_cloth;
+use super::clearance::{Clearance, YieldedBody};
 use super::obstacle::BodyObstacle;
-use crate::query::Surface;
-
-/// Calls `with` the body of `surface` as given, near `layers`: the same garments once or, at several positions, more often.
-pub(super) fn with_drawn<R>(
-    surface: &Surface<f64>,
-    layers: &[Layer<'_>],
-    with: impl FnOnce(BodyObstacle<'_>) -> R,
-) -> R {
-    let near = near_cloth(&surface.positions, &surface.faces, &triangles(layers));
-    with(BodyObstacle::new(surface, &near))
-}
-
-/// Calls `with` a `drawn` body that can yield to `garments` garments.
-pub(super) fn with_body<R>(drawn: BodyObstacle<'_>, garments: usize, with: impl FnOnce(&Body<'_>) -> R) -> R {
-    with_body_after(Clearance::AMPLE, None, drawn, garments, with)
-}
-
-/// [`with_body`] that yields as `clearance` says, a step after its yield was `before`.
-pub(super) fn with_body_after<R>(
-    clearance: Clearance,
-    before: Option<Before<'_>>,
-    mut drawn: BodyObstacle<'_>,
-    garments: usize,
-    with: impl FnOnce(&Body<'_>) -> R,
-) -> R {
-    let yielded = YieldedBody::of(&drawn, garments, clearance, before);
-    if let Some(yielded) = &yielded {
-        drawn.yields(yielded);
-    }
-    with(&Body { drawn, garments, yielded: yielded.as_ref(), yielded_obstacle: OnceCell::new() })
-}
 
 /// A posed body near some garments.
-pub(super) struct Body<'a> {
+pub(super) struct SoftBody<'a> {
     /// As given: what a certificate counts against. Faces that yield are noted.
     pub drawn: BodyObstacle<'a>,
     garments: usize,
@@ -48,12 +14,21 @@ pub(super) struct Body<'a> {
     yielded_obstacle: OnceCell<BodyObstacle<'a>>,
 }
 
-impl<'a> Body<'a> {
+impl<'a> SoftBody<'a> {
+    /// The body that is `drawn` near so many `garments`, and how it has `yielded` to them, if it has.
+    pub fn new(mut drawn: BodyObstacle<'a>, garments: usize, yielded: Option<&'a YieldedBody>) -> Self {
+        if let Some(yielded) = yielded {
+            drawn.yields(yielded);
+        }
+        Self { drawn, garments, yielded, yielded_obstacle: OnceCell::new() }
+    }
+
     /// The obstacle of the garments while they are untangled.
     pub fn obstacle(&self) -> &BodyObstacle<'a> {
         match self.yielded {
             Some(yielded) => {
-                self.yielded_obstacle.get_or_init(|| BodyObstacle::yielded_obstacle(yielded, self.drawn.near))
+                let made = || BodyObstacle::yielded_obstacle(yielded, &self.drawn.near);
+                self.yielded_obstacle.get_or_init(made)
             }
             None => &self.drawn,
         }
@@ -68,7 +43,7 @@ impl<'a> Body<'a> {
     /// Calls `with` the obstacle whose yield is what `clearance` says.
     pub fn with_clearance<R>(&self, clearance: Clearance, with: impl FnOnce(&BodyObstacle<'_>) -> R) -> R {
         match YieldedBody::of(&self.drawn, self.garments, clearance, None) {
-            Some(yielded) => with(&BodyObstacle::yielded_obstacle(&yielded, self.drawn.near)),
+            Some(yielded) => with(&BodyObstacle::yielded_obstacle(&yielded, &self.drawn.near)),
             None => with(&self.drawn),
         }
     }

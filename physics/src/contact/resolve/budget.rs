@@ -12,7 +12,7 @@ const OVERLAPPING: usize = 1000;
 /// Such a body gets one in so many of the rounds.
 const SHORTER: usize = 4;
 /// One in so many of the rounds is kept for the end of a path.
-const LAST: usize = 10;
+const LAST_SHARE: usize = 10;
 
 /// Counts rounds, which do not depend on the machine, and, where a limit is asked for, wall time.
 pub(super) struct Budget {
@@ -20,8 +20,10 @@ pub(super) struct Budget {
     time: Option<Duration>,
     rounds: Cell<usize>,
     spent: Cell<usize>,
-    body_time: Cell<Duration>,
-    certificate_time: Cell<Duration>,
+    /// Time to prepare bodies.
+    pub body_time: Cell<Duration>,
+    /// Time for certificates.
+    pub certificate_time: Cell<Duration>,
 }
 
 impl Budget {
@@ -67,33 +69,31 @@ impl Budget {
 
     /// Whether only the last rounds are left: what is under way had better come to its end.
     pub fn is_nearly_spent(&self) -> bool {
-        self.spent() >= self.rounds.get() - self.rounds.get() / LAST || self.is_late()
+        self.spent() >= self.rounds.get() - self.rounds.get() / LAST_SHARE || self.is_late()
     }
 
-    /// Counts the time since `start` as that to prepare a body.
-    pub fn count_body(&self, start: Instant) {
-        self.body_time.set(self.body_time() + start.elapsed());
+    /// What `prepare` returns; its time counts as that to prepare a body.
+    pub fn preparing<R>(&self, prepare: impl FnOnce() -> R) -> R {
+        timed(&self.body_time, prepare)
     }
 
-    /// Counts the time since `start` as that for a certificate.
-    pub fn count_certificate(&self, start: Instant) {
-        self.certificate_time.set(self.certificate_time() + start.elapsed());
-    }
-
-    /// Time to prepare bodies.
-    pub fn body_time(&self) -> Duration {
-        self.body_time.get()
-    }
-
-    /// Time for certificates.
-    pub fn certificate_time(&self) -> Duration {
-        self.certificate_time.get()
+    /// What `certify` returns; its time counts as that for a certificate.
+    pub fn certifying<R>(&self, certify: impl FnOnce() -> R) -> R {
+        timed(&self.certificate_time, certify)
     }
 
     /// Wall time since it began.
     pub fn elapsed(&self) -> Duration {
         self.start.elapsed()
     }
+}
+
+/// What `run` returns; its time is added to `total`.
+fn timed<R>(total: &Cell<Duration>, run: impl FnOnce() -> R) -> R {
+    let start = Instant::now();
+    let done = run();
+    total.set(total.get() + start.elapsed());
+    done
 }
 
 #[cfg(test)]

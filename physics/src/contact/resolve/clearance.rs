@@ -7,26 +7,26 @@
 
 use rayon::prelude::*;
 
-use super::contact::{along_line, normal_of};
+use super::condition::{along_line, normal_of};
 use super::obstacle::{BodyObstacle, touching};
-use crate::contact::{Triangle, TriangleTree};
+use crate::contact::Triangle;
 use crate::query::{FaceSide, Surface};
-use crate::vec3::{add_scaled, dot};
+use crate::vec3::{add_scaled, bounds, dot};
 
 /// Distance that two facing parts of the body keep (m), for straight triangles around a limb…
-const CLEARANCE: f64 = 0.006;
+const BODY_CLEARANCE: f64 = 0.006;
 /// …and for the two sheets of each garment (m).
 const CLEARANCE_PER_GARMENT: f64 = 0.002;
 /// Two surfaces face each other where their normals have a cosine below this.
-const FACING: f64 = -0.3;
+const FACING_PARTS: f64 = -0.3;
 /// Farthest that the surface of another part is looked for (m).
-const DEEPEST: f64 = 0.08;
+const DEEPEST_PART: f64 = 0.08;
 /// Largest yield of a vertex (m).
-const LONGEST_STEP: f64 = 0.04;
+const LONGEST_YIELD: f64 = 0.04;
 /// Rings of neighbours that yield along, each half as far.
 const RINGS: usize = 2;
 /// How far outside the surface a vertex is asked whether it is inside another part (m).
-const LOOK_OUT: f64 = 1e-6;
+const VERTEX_LOOK_OUT: f64 = 1e-6;
 
 /// Where a body yields: where it lies inside itself, and where two parts are too near to each other for cloth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,6 +72,11 @@ pub(super) struct YieldedBody {
 }
 
 impl YieldedBody {
+    /// Of the body `drawn` near `garments` garments, wherever two surfaces face each other.
+    pub fn ample(drawn: &BodyObstacle<'_>, garments: usize) -> Option<Self> {
+        Self::of(drawn, garments, Clearance::AMPLE, None)
+    }
+
     /// Of the given body `drawn`, near `garments` garments. `None` if nothing has to yield, or the surface is not closed and has
     /// no inside.
     pub fn of(
@@ -82,7 +87,7 @@ impl YieldedBody {
     ) -> Option<Self> {
         let body = drawn.surface;
         let (mut steps, pinched) =
-            steps(drawn, CLEARANCE + CLEARANCE_PER_GARMENT * garments as f64, clearance.is_deep)?;
+            steps(drawn, BODY_CLEARANCE + CLEARANCE_PER_GARMENT * garments as f64, clearance.is_deep)?;
         if let Some(Before { steps: before, most }) = before {
             steps.iter_mut().zip(before).for_each(|(step, was)| *step = step.clamp(was - most, was + most));
         }
@@ -101,8 +106,9 @@ impl YieldedBody {
 
 impl<'a> BodyObstacle<'a> {
     /// The body after yielding. Where it meets itself only because of that, it counts as it was.
-    pub fn yielded_obstacle(yielded: &'a YieldedBody, near: &'a [bool]) -> Self {
-        let mut obstacle = Self::pinched_where(&yielded.surface, near, |v| yielded.pinched[v as usize]);
+    pub fn yielded_obstacle(yielded: &'a YieldedBody, near: &[bool]) -> Self {
+        let is_pinched = |v: u32| yielded.pinched[v as usize];
+        let mut obstacle = Self::pinched_where(&yielded.surface, near.to_vec(), is_pinched);
         obstacle.yields(yielded);
         obstacle
     }
@@ -116,7 +122,7 @@ impl<'a> BodyObstacle<'a> {
 /// How far every vertex steps back, against its normal (m); only those `near` cloth and around them do. Also the corners of
 /// faces inside another part, or intersecting one. `None` without an inside.
 fn steps(drawn: &BodyObstacle<'_>, clearance: f64, is_deep: bool) -> Option<(Vec<f64>, Vec<bool>)> {
-    let BodyObstacle { surface, near, tree, .. } = drawn;
+    let BodyObstacle { surface, near, .. } = drawn;
     let (positions, faces, union) = (&surface.positions, &surface.faces, drawn.union.as_ref()?);
     // Whether all, or some, of the faces at a vertex are inside another part.
     let (mut all_inside, mut some_inside) = (vec![true; positions.len()], vec![false; positions.len()]);
@@ -132,13 +138,14 @@ fn steps(drawn: &BodyObstacle<'_>, clearance: f64, is_deep: bool) -> Option<(Vec
         }
         let (p, n) = (positions[v], surface.normals[v]);
         let is_inside =
-            all_inside[v] || some_inside[v] && union.winding_number(add_scaled(p, LOOK_OUT, n)) >= 1;
+            all_inside[v] || some_inside[v] && union.winding_number(add_scaled(p, VERTEX_LOOK_OUT, n)) >= 1;
+        let (deepest, v) = (DEEPEST_PART, v as u32);
         let apart = match is_inside {
-            true => facing_surface(tree, faces, v as u32, -DEEPEST, p, n)
-                .or_else(|| is_deep.then(|| -nearest_facing(tree, faces, v as u32, p, n).unwrap_or(DEEPEST))),
-            false => facing_surface(tree, faces, v as u32, clearance, p, n),
+            true => facing_surface(drawn, v, -deepest)
+                .or_else(|| is_deep.then(|| -nearest_facing(drawn, v).unwrap_or(deepest))),
+            false => facing_surface(drawn, v, clearance),
         };
-        apart.map_or(0.0, |apart| (0.5 * (clearance - apart)).clamp(0.0, LONGEST_STEP))
+        apart.map_or(0.0, |apart| (0.5 * (clearance - apart)).clamp(0.0, LONGEST_YIELD))
     };
     let mut steps: Vec<f64> = (0..positions.len()).into_par_iter().with_min_len(256).map(missing).collect();
     for _ in 0..RINGS {
@@ -151,42 +158,30 @@ fn steps(drawn: &BodyObstacle<'_>, clearance: f64, is_deep: bool) -> Option<(Vec
     Some((steps, some_inside))
 }
 
-/// How far along `n` from vertex `v` at `p` a surface faces it, at most `reach` (backwards where that is negative).
-fn facing_surface(
-    tree: &TriangleTree<'_>,
-    faces: &[[u32; 3]],
-    v: u32,
-    reach: f64,
-    p: [f64; 3],
-    n: [f64; 3],
-) -> Option<f64> {
-    let end = add_scaled(p, reach, n);
-    let low = std::array::from_fn(|k| p[k].min(end[k]));
-    let high = std::array::from_fn(|k| p[k].max(end[k]));
+/// How far from vertex `v` along its normal a surface faces it, at most `reach` (backwards where that is negative).
+fn facing_surface(BodyObstacle { surface, tree, .. }: &BodyObstacle<'_>, v: u32, reach: f64) -> Option<f64> {
+    let (p, n) = (surface.positions[v as usize], surface.normals[v as usize]);
     let faces_it = |f: u32| {
-        if faces[f as usize].contains(&v) {
+        if surface.faces[f as usize].contains(&v) {
             return None;
         }
         let triangle = tree.triangle(f)?;
         let (along, _) = along_line(p, n, &triangle)?;
         let is_in_reach = along * reach.signum() > 0.0 && along.abs() <= reach.abs();
-        (is_in_reach && dot(normal_of(&triangle), n) < FACING).then_some(along)
+        (is_in_reach && dot(normal_of(&triangle), n) < FACING_PARTS).then_some(along)
     };
-    tree.faces_in_box(low, high).filter_map(faces_it).min_by(|a, b| a.abs().total_cmp(&b.abs()))
+    let along = tree.faces_in_box(bounds([p, add_scaled(p, reach, n)]));
+    along.filter_map(faces_it).min_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
-/// How far from vertex `v` at `p`, inside another part, the nearest surface is that does not face the way of `n`: for a vertex
+/// How far from vertex `v`, inside another part, the nearest surface is that does not face the way of its normal: for a vertex
 /// that has just gone in at a slant, and has no surface straight behind it.
-fn nearest_facing(
-    tree: &TriangleTree<'_>,
-    faces: &[[u32; 3]],
-    v: u32,
-    p: [f64; 3],
-    n: [f64; 3],
-) -> Option<f64> {
-    let looks_elsewhere =
-        |f: u32, triangle: &Triangle| !faces[f as usize].contains(&v) && dot(normal_of(triangle), n) < 0.0;
-    tree.nearest(p, DEEPEST, looks_elsewhere)
+fn nearest_facing(BodyObstacle { surface, tree, .. }: &BodyObstacle<'_>, v: u32) -> Option<f64> {
+    let n = surface.normals[v as usize];
+    let looks_elsewhere = |f: u32, triangle: &Triangle| {
+        !surface.faces[f as usize].contains(&v) && dot(normal_of(triangle), n) < 0.0
+    };
+    tree.nearest(surface.positions[v as usize], DEEPEST_PART, looks_elsewhere)
 }
 
 #[cfg(test)]
@@ -205,7 +200,7 @@ mod tests {
     fn yielded_obstacle(apart: f64, garments: usize) -> (Surface<f64>, Option<YieldedBody>) {
         let body = Surface::from_mesh(&balls(apart));
         let near = vec![true; body.positions.len()];
-        let yielded = YieldedBody::of(&BodyObstacle::new(&body, &near), garments, Clearance::AMPLE, None);
+        let yielded = YieldedBody::of(&BodyObstacle::new(&body, near), garments, Clearance::AMPLE, None);
         (body, yielded)
     }
 
@@ -223,7 +218,7 @@ mod tests {
         for (apart, garments) in [(0.19, 1), (0.203, 1), (0.17, 3)] {
             let (body, yielded) = yielded_obstacle(apart, garments);
             let yielded = yielded.unwrap();
-            let clearance = CLEARANCE + CLEARANCE_PER_GARMENT * garments as f64;
+            let clearance = BODY_CLEARANCE + CLEARANCE_PER_GARMENT * garments as f64;
             assert!(space(&body, apart) < 0.5 * clearance);
             let space = space(&yielded.surface, apart);
             assert!((0.9 * clearance..1.3 * clearance).contains(&space), "{apart}: {space} of {clearance}");
@@ -242,7 +237,7 @@ mod tests {
     fn the_yield_is_limited_per_step_and_scales_with_the_share() {
         let body = Surface::from_mesh(&balls(0.19));
         let near = vec![true; body.positions.len()];
-        let drawn = BodyObstacle::new(&body, &near);
+        let drawn = BodyObstacle::new(&body, near);
         let all = YieldedBody::of(&drawn, 1, Clearance::AMPLE, None).unwrap();
         let (steps, most) = (vec![0.0; body.positions.len()], 0.002);
         let slow =
@@ -269,13 +264,13 @@ mod tests {
         let steps = |apart: f64| {
             let body = Surface::from_mesh(&balls(apart));
             let near = vec![true; body.positions.len()];
-            YieldedBody::of(&BodyObstacle::new(&body, &near), 1, Clearance::DEEP, None).unwrap().steps
+            YieldedBody::of(&BodyObstacle::new(&body, near), 1, Clearance::DEEP, None).unwrap().steps
         };
         for apart in [0.199, 0.19, 0.17, 0.15] {
             // Nowhere farther than half of what overlaps along the line of the centres.
             let most = steps(apart).into_iter().fold(0.0, f64::max);
             assert!(
-                most <= 0.5 * (0.2 - apart + CLEARANCE + CLEARANCE_PER_GARMENT) * 1.05 + 1e-9,
+                most <= 0.5 * (0.2 - apart + BODY_CLEARANCE + CLEARANCE_PER_GARMENT) * 1.05 + 1e-9,
                 "{apart}: {most}"
             );
         }
@@ -286,14 +281,14 @@ mod tests {
         assert!(yielded_obstacle(0.25, 1).1.is_none());
         let open = Surface::from_mesh(&shapes::grid(0.1, 0.1, 4, 4));
         let near = vec![true; open.positions.len()];
-        assert!(YieldedBody::of(&BodyObstacle::new(&open, &near), 1, Clearance::AMPLE, None).is_none());
+        assert!(YieldedBody::of(&BodyObstacle::new(&open, near), 1, Clearance::AMPLE, None).is_none());
         let body = Surface::from_mesh(&balls(0.19));
         let far = vec![false; body.positions.len()];
-        assert!(YieldedBody::of(&BodyObstacle::new(&body, &far), 1, Clearance::AMPLE, None).is_none());
+        assert!(YieldedBody::of(&BodyObstacle::new(&body, far), 1, Clearance::AMPLE, None).is_none());
         // Near each other, but not inside.
         let body = Surface::from_mesh(&balls(0.203));
         let near = vec![true; body.positions.len()];
-        let drawn = BodyObstacle::new(&body, &near);
+        let drawn = BodyObstacle::new(&body, near);
         assert!(YieldedBody::of(&drawn, 1, Clearance::AMPLE, None).is_some());
         assert!(YieldedBody::of(&drawn, 1, Clearance::AMPLE.with_share(0.0), None).is_none());
     }

@@ -5,18 +5,20 @@
 //! is short: the resolved state moves on by skinning and by the change of the drape, intersections stay shallow, and the nearest
 //! exit is right. A step that raises the number of intersections is halved.
 
-use super::attempt::{FEW, resolved_further, settled};
-use super::body::{Body, with_body, with_drawn};
+use super::attempt::{FEW_PAIRS, resolved_further, settled};
+use super::body::SoftBody;
 use super::budget::Budget;
+use super::clearance::YieldedBody;
 use super::garment::check;
+use super::obstacle::BodyObstacle;
 use super::path::{Path, placed};
-use super::path_samples::PathSamples;
+use super::path_sample::PathEnd;
 use super::step_lengths::StepLengths;
 use super::strain_relaxation::{TIMES, TIMES_IN_FRAME};
+use super::task::Task;
 use super::{ContactState, Layer, PathSample, ResolveError, ResolveSettings, Resolved};
 use crate::query::Surface;
 use crate::transform::Transform;
-use std::time::Instant;
 
 /// As [`super::resolve`]; if intersections of `layers` on `body` remain, the garments go along a path from the sample at 0, the
 /// T-pose, to the sample at 1, on `body`. The difference between `layers` and the sample there is added along the path.
@@ -29,13 +31,16 @@ pub fn resolve_along<E: From<ResolveError>>(
     settings: &ResolveSettings,
     mut sample_at: impl FnMut(f64) -> Result<PathSample, E>,
 ) -> Result<Resolved, E> {
-    let mut samples = PathSamples::to(layers);
-    let mut checked_at = |share: f64| Ok::<_, E>(checked(sample_at(share)?, layers)?);
-    let mut sample_at = |share: f64| samples.at(share, &mut checked_at);
-    let most = if settings.steps > 0 { FEW } else { usize::MAX };
-    let along = |end: &Body<'_>, mut best: Resolved, budget: &Budget| {
-        if !best.certificate.is_clear() && settings.steps > 0 && !budget.is_spent() {
-            let path = Path { layers, end, settings, budget, step_lengths: StepLengths::FROM_T_POSE };
+    let most = if settings.steps > 0 { FEW_PAIRS } else { usize::MAX };
+    let along = |end: &SoftBody<'_>, mut best: Resolved, task: Task<'_>| {
+        if !best.certificate.is_clear() && settings.steps > 0 && !task.budget.is_spent() {
+            let mut checked_at = |share: f64| Ok::<_, E>(checked(sample_at(share)?, layers)?);
+            let path_end = PathEnd::new(checked_at(1.0)?, layers);
+            let mut sample_at = |share: f64| match share {
+                1.0 => Ok::<_, E>(path_end.sample.clone()),
+                _ => Ok(path_end.faded_in(share, checked_at(share)?)),
+            };
+            let path = Path { task, end, step_lengths: StepLengths::FROM_T_POSE };
             path.improve(&mut best, sample_at(0.0)?, &mut sample_at)?;
         }
         Ok::<_, E>(best)
@@ -59,27 +64,26 @@ pub fn resolve_after<E: From<ResolveError>>(
     settings.check()?;
     check(body, layers)?;
     check_transforms(&before.transforms, layers)?;
-    let preparing = Instant::now();
-    let carry_on = |body: &Body<'_>| {
-        budget.count_body(preparing);
-        let step_lengths =
-            if before.intersections == 0 { StepLengths::OF_FRAME } else { StepLengths::OF_INTERSECTED_FRAME };
-        let path = Path { layers, end: body, settings, budget, step_lengths };
-        let (followed, steps) =
-            path.continue_from(before, |share| Ok::<_, E>(checked(sample_at(share)?, layers)?))?;
-        let Some(found) = followed else { return Ok(None) };
-        let mut resolved = settled(body, layers, found, settings, step_lengths.clearance, budget);
-        resolved.go_on(body.drawn.surface, layers, settings, budget);
-        resolved.relax_strain(&body.drawn, layers, settings, budget, TIMES_IN_FRAME);
+    let drawn = budget.preparing(|| BodyObstacle::near_layers(body, layers));
+    let yielded = budget.preparing(|| YieldedBody::ample(&drawn, layers.len()));
+    let end = &SoftBody::new(drawn, layers.len(), yielded.as_ref());
+    let step_lengths =
+        if before.intersections == 0 { StepLengths::OF_FRAME } else { StepLengths::OF_INTERSECTED_FRAME };
+    let task = Task { layers, settings, budget };
+    let path = Path { task, end, step_lengths };
+    let (followed, steps) =
+        path.continue_from(before, |share| Ok::<_, E>(checked(sample_at(share)?, layers)?))?;
+    let Some(found) = followed else { return Ok(None) };
+    let mut resolved = settled(end, found, step_lengths.clearance, task);
+    resolved.go_on(body, task);
+    resolved.relax_strain(&end.drawn, task, TIMES_IN_FRAME);
+    resolved.compare_since(layers, budget);
+    if resolved.certificate.excess_strain() > 0 {
+        resolved.relax_strain(&end.drawn, task, TIMES - TIMES_IN_FRAME);
         resolved.compare_since(layers, budget);
-        if resolved.certificate.excess_strain() > 0 {
-            resolved.relax_strain(&body.drawn, layers, settings, budget, TIMES - TIMES_IN_FRAME);
-            resolved.compare_since(layers, budget);
-        }
-        resolved.steps = steps;
-        Ok(Some(resolved))
-    };
-    with_drawn(body, layers, |drawn| with_body(drawn, layers.len(), carry_on))
+    }
+    resolved.steps = steps;
+    Ok(Some(resolved))
 }
 
 /// The sample, if it fits the garments.

@@ -1,9 +1,10 @@
 //! Counts the certificate from nothing: all pairs of triangles, and the depth of every vertex.
 
-use super::body::{with_body, with_drawn};
+use super::body::SoftBody;
 use super::certificate::Certificate;
+use super::clearance::YieldedBody;
 use super::garment::{at, check};
-use super::near::MARGIN;
+use super::near::NEAR_MARGIN;
 use super::obstacle::BodyObstacle;
 use super::{Layer, ResolveError};
 use crate::contact::{
@@ -24,17 +25,17 @@ pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate,
 
 /// [`certify`] for valid arguments.
 pub(super) fn certified_around(body: &Surface<f64>, layers: &[Layer<'_>]) -> Certificate {
-    with_drawn(body, layers, |drawn| {
-        let mut found = certificate(&drawn, layers);
-        if found.body_triangle_pairs > 0 {
-            with_body(drawn, layers.len(), |body| found.count_narrow(&body.drawn));
-        }
-        found
-    })
+    let drawn = BodyObstacle::near_layers(body, layers);
+    let mut found = certificate(&drawn, layers);
+    if found.body_triangle_pairs > 0 {
+        let yielded = YieldedBody::ample(&drawn, layers.len());
+        found.count_narrow(&SoftBody::new(drawn, layers.len(), yielded.as_ref()).drawn);
+    }
+    found
 }
 
 /// [`certified_around`] near a `body` that is prepared; its yield is as it was noted.
-pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Certificate {
+fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Certificate {
     let mut found = counted(body, layers);
     found.count_narrow(body);
     found
@@ -63,7 +64,7 @@ impl ReportBody for BodyObstacle<'_> {
     }
 
     fn distance(&self, p: [f64; 3]) -> Option<(f64, [f64; 3])> {
-        self.look(p)?.plane.map(|plane| plane.seen())
+        self.look(p)?.plane.map(|plane| (plane.distance, plane.normal))
     }
 
     fn is_pinched(&self, face: u32) -> bool {
@@ -90,6 +91,6 @@ pub(super) fn certified(
 
 /// Whether nothing moved so far from `layers` that it could meet more of the body than what is near those.
 pub(super) fn is_near(layers: &[Layer<'_>], positions: &[Vec<[f64; 3]>]) -> bool {
-    let is_near = |(p, q): (&[f64; 3], &[f64; 3])| vec3::norm(vec3::sub(*q, *p)) <= MARGIN;
+    let is_near = |(p, q): (&[f64; 3], &[f64; 3])| vec3::norm(vec3::sub(*q, *p)) <= NEAR_MARGIN;
     layers.iter().zip(positions).all(|(layer, moved)| layer.positions.iter().zip(moved).all(is_near))
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::obstacle::BodyObstacle;
-use super::outfit::Outfit;
+use super::packed_cloth::PackedCloth;
 use crate::contact::TriangleTree;
 use crate::vec3::distance_squared;
 
@@ -38,7 +38,7 @@ impl IntersectingPairs {
     /// body; garments with themselves, and where the body is pinched, only count if asked for.
     pub fn update(
         &mut self,
-        outfit: &Outfit<'_>,
+        outfit: &PackedCloth<'_>,
         body: &BodyObstacle<'_>,
         trees: &[TriangleTree<'_>],
         positions: &[[f64; 3]],
@@ -117,7 +117,7 @@ mod tests {
 
     /// All pairs of faces, by looking at each.
     fn all_pairs<'a>(
-        outfit: &'a Outfit<'_>,
+        outfit: &'a PackedCloth<'_>,
         positions: &'a [[f64; 3]],
         body: &'a Surface<f64>,
     ) -> [Vec<(u32, u32)>; 2] {
@@ -150,9 +150,9 @@ mod tests {
         let places = meshes.each_ref().map(on_top);
         let layers: Vec<Layer<'_>> =
             garments.iter().zip(&places).map(|(garment, positions)| Layer { garment, positions }).collect();
-        let outfit = Outfit::new(&layers);
+        let outfit = PackedCloth::new(&layers);
         let near = vec![true; ball.positions.len()];
-        let body = BodyObstacle::new(&ball, &near);
+        let body = BodyObstacle::new(&ball, near);
         let mut positions = places.concat();
         let mut kept = IntersectingPairs::new(outfit.faces.len());
         let mut counts = [0; 3];

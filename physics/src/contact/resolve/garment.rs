@@ -1,7 +1,7 @@
 //! A garment as the post-process sees it: what its positions do not change, and where it is.
 
 use super::ResolveError;
-use crate::contact::LayerTopology;
+use crate::contact::{LayerTopology, Triangle};
 use crate::energy::{EnergySettings, Material, strain::Strain};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::Surface;
@@ -9,7 +9,7 @@ use crate::rows::{CompressedRows, faces_at_vertices};
 use crate::vec3::{self, norm, sub};
 
 /// Positions farther from the origin than this are refused (m): the exact predicates would hold, but no distance would.
-pub const FARTHEST: f64 = 1e3;
+pub const FARTHEST_POSITION: f64 = 1e3;
 
 /// Everything about a garment that its positions do not change: made once, used for every frame and body.
 #[derive(Debug)]
@@ -91,14 +91,15 @@ pub(super) fn at<'a>(layers: &[Layer<'a>], positions: &'a [Vec<[f64; 3]>]) -> Ve
     layers.iter().zip(positions).map(|(l, positions)| Layer { garment: l.garment, positions }).collect()
 }
 
-/// Positions and faces of every garment.
-pub(super) fn triangles<'a>(layers: &[Layer<'a>]) -> Vec<(&'a [[f64; 3]], &'a [[u32; 3]])> {
-    layers.iter().map(|l| (l.positions, l.garment.faces.as_slice())).collect()
+/// Corners of all faces of the garments.
+pub(super) fn triangles(layers: &[Layer<'_>]) -> Vec<Triangle> {
+    let corners = |l: &Layer<'_>, face: &[u32; 3]| face.map(|v| l.positions[v as usize]);
+    layers.iter().flat_map(|l| l.garment.faces.iter().map(move |face| corners(l, face))).collect()
 }
 
 /// Whether the input can be worked on.
 pub(super) fn check(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<(), ResolveError> {
-    let is_near = |p: &[f64; 3]| vec3::is_finite(*p) && p.iter().all(|x| x.abs() <= FARTHEST);
+    let is_near = |p: &[f64; 3]| vec3::is_finite(*p) && p.iter().all(|x| x.abs() <= FARTHEST_POSITION);
     let is_whole = |f: &[u32; 3]| f.iter().all(|&v| body.positions.get(v as usize).is_some_and(is_near));
     if !body.faces.iter().any(is_whole) {
         return Err(ResolveError::EmptyBody);

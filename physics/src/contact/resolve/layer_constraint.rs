@@ -8,11 +8,11 @@ use std::ops::RangeInclusive;
 
 use rayon::prelude::*;
 
-use super::contact::{Contact, along_line, is_tiny, normal_of, overlap};
-use super::outfit::Outfit;
+use super::condition::{Condition, along_line, is_tiny, normal_of, overlap};
+use super::packed_cloth::PackedCloth;
 use crate::contact::{Triangle, TriangleTree};
 use crate::mesh::vertex_normals;
-use crate::vec3::{add, add_scaled, dot, neg, norm, normalized, scale, sub};
+use crate::vec3::{add, add_scaled, bounds, dot, neg, norm, normalized, scale, sub};
 
 /// A sheet whose outward direction differs more than this from the vertex's (cosine) lies over another part of
 /// the body: a sleeve is not over the side of the chest.
@@ -22,7 +22,7 @@ const SAME_PART: f64 = 0.5;
 pub(super) const STEEP: f64 = 0.5;
 
 /// Two sheets look at each other where their directions away from the body have a cosine below this.
-const FACING: f64 = -0.3;
+const FACING_SHEETS: f64 = -0.3;
 /// Rings over which directions are smoothed.
 const SMOOTHED_RINGS: usize = 4;
 
@@ -39,55 +39,40 @@ pub(super) struct LayerConstraint {
 }
 
 impl LayerConstraint {
-    pub fn contact(&self, gap: f64) -> Contact {
-        Contact::vertex_over(self.vertex, (self.face, self.barycentric), self.normal, gap)
+    pub fn contact(&self, gap: f64) -> Condition {
+        Condition::vertex_over(self.vertex, (self.face, self.barycentric), self.normal, gap)
     }
 }
 
 /// Every vertex with a sheet of an inner garment less than `reach` above it or less than `watch` below it.
 /// `trees` are those of the garments, `outward` the direction away from the body, zero where there is none.
 pub(super) fn layer_constraints(
-    outfit: &Outfit<'_>,
+    outfit: &PackedCloth<'_>,
     trees: &[TriangleTree<'_>],
     positions: &[[f64; 3]],
     outward: &[[f64; 3]],
     (reach, watch): (f64, f64),
 ) -> Vec<LayerConstraint> {
     let end = outfit.vertex_count() as u32;
+    let look = |inner: usize, vertex: u32| {
+        let (p, away) = (positions[vertex as usize], outward[vertex as usize]);
+        if away == [0.0; 3] {
+            return None;
+        }
+        let along = bounds([add_scaled(p, -watch, away), add_scaled(p, reach, away)]);
+        let first = outfit.faces_of_garment(inner).start;
+        let mut outermost = OutermostSheet { from: p, away, heights: -watch..=reach, found: None };
+        for f in trees[inner].faces_in_box(along) {
+            outermost.offer(first + f, outfit.faces[(first + f) as usize], positions, outward);
+        }
+        outermost.over(vertex, outfit, positions)
+    };
     (0..outfit.len().saturating_sub(1))
         .flat_map(|inner| {
-            let outer = outfit.vertices(inner).end..end;
-            outer
-                .into_par_iter()
-                .with_min_len(256)
-                .filter_map(|v| look(outfit, &trees[inner], inner, positions, outward, v, (reach, watch)))
-                .collect::<Vec<_>>()
+            let outer = (outfit.vertices(inner).end..end).into_par_iter().with_min_len(256);
+            outer.filter_map(|vertex| look(inner, vertex)).collect::<Vec<_>>()
         })
         .collect()
-}
-
-fn look(
-    outfit: &Outfit<'_>,
-    tree: &TriangleTree<'_>,
-    inner: usize,
-    positions: &[[f64; 3]],
-    outward: &[[f64; 3]],
-    vertex: u32,
-    (reach, watch): (f64, f64),
-) -> Option<LayerConstraint> {
-    let (p, away) = (positions[vertex as usize], outward[vertex as usize]);
-    if away == [0.0; 3] {
-        return None;
-    }
-    let (from, to) = (add_scaled(p, -watch, away), add_scaled(p, reach, away));
-    let low = std::array::from_fn(|k| from[k].min(to[k]));
-    let high = std::array::from_fn(|k| from[k].max(to[k]));
-    let first = outfit.faces_of_garment(inner).start;
-    let mut outermost = OutermostSheet { from: p, away, heights: -watch..=reach, found: None };
-    for f in tree.faces_in_box(low, high) {
-        outermost.offer(first + f, outfit.faces[(first + f) as usize], positions, outward);
-    }
-    outermost.over(vertex, outfit, positions)
 }
 
 /// Of the sheets of one garment that a vertex sees along its direction away from the body, the outermost.
@@ -105,7 +90,7 @@ pub(super) struct OutermostSheet {
 impl OutermostSheet {
     /// Looks at face number `f`, unless it lies over another part of the body.
     pub fn offer(&mut self, f: u32, face: [u32; 3], positions: &[[f64; 3]], outward: &[[f64; 3]]) {
-        let sheet = face.iter().fold([0.0; 3], |sum, &v| add(sum, outward[v as usize]));
+        let sheet = sum_over(face, outward);
         if dot(sheet, self.away) < SAME_PART * norm(sheet) {
             return;
         }
@@ -119,7 +104,12 @@ impl OutermostSheet {
     }
 
     /// What `vertex` has to stay over.
-    pub fn over(self, vertex: u32, outfit: &Outfit<'_>, positions: &[[f64; 3]]) -> Option<LayerConstraint> {
+    pub fn over(
+        self,
+        vertex: u32,
+        outfit: &PackedCloth<'_>,
+        positions: &[[f64; 3]],
+    ) -> Option<LayerConstraint> {
         let (above, f, barycentric) = self.found?;
         let face = outfit.faces[f as usize];
         let normal = sheet_normal(&face.map(|v| positions[v as usize]), self.away);
@@ -137,27 +127,28 @@ fn sheet_normal(sheet: &Triangle, away: [f64; 3]) -> [f64; 3] {
     }
 }
 
-/// How two intersecting triangles have to lie, by their directions away from the body.
-pub(super) enum Order {
-    /// The first over the second, along this direction.
-    Along([f64; 3]),
-    /// Nothing says so.
-    Unknown,
+/// The direction along which the first of two triangles has to lie over the second, by their directions away from the body; none
+/// where nothing says so. Where they look at each other (a sleeve and the side of the chest) each has to stay on its own part's
+/// side, whichever garments they belong to; otherwise the outer garment lies over the inner one, and two folds of one garment have
+/// no order.
+pub(super) fn order(
+    first: [u32; 3],
+    second: [u32; 3],
+    is_outer: bool,
+    outward: &[[f64; 3]],
+) -> Option<[f64; 3]> {
+    let [a, b] = [first, second].map(|face| normalized(sum_over(face, outward)));
+    match dot(a, b) {
+        _ if a == [0.0; 3] || b == [0.0; 3] => None,
+        c if c < FACING_SHEETS => Some(normalized(sub(b, a))),
+        _ if is_outer => Some(normalized(add(a, b))),
+        _ => None,
+    }
 }
 
-/// The order of two triangles that intersect. Where they look at each other (a sleeve and the side of the chest) each has to stay
-/// on its own part's side, whichever garments they belong to; otherwise the outer garment lies over the inner one, and two
-/// folds of one garment have no order.
-pub(super) fn order(first: [u32; 3], second: [u32; 3], is_outer: bool, outward: &[[f64; 3]]) -> Order {
-    let mean =
-        |face: [u32; 3]| normalized(face.iter().fold([0.0; 3], |sum, &v| add(sum, outward[v as usize])));
-    let (a, b) = (mean(first), mean(second));
-    match dot(a, b) {
-        _ if a == [0.0; 3] || b == [0.0; 3] => Order::Unknown,
-        c if c < FACING => Order::Along(normalized(sub(b, a))),
-        _ if is_outer => Order::Along(normalized(add(a, b))),
-        _ => Order::Unknown,
-    }
+/// The sum of what the corners of a face have.
+pub(super) fn sum_over(face: [u32; 3], values: &[[f64; 3]]) -> [f64; 3] {
+    face.iter().fold([0.0; 3], |sum, &v| add(sum, values[v as usize]))
 }
 
 /// Conditions for two intersecting triangles: the first has to lie `gap` over the second along `away`, as far as they cover each
@@ -169,7 +160,7 @@ pub(super) fn part_along(
     positions: &[[f64; 3]],
     gap: f64,
     longest_step: f64,
-    found: &mut Vec<Contact>,
+    found: &mut Vec<Condition>,
 ) {
     let upper = first.map(|v| positions[v as usize]);
     let lower = second.map(|v| positions[v as usize]);
@@ -187,7 +178,12 @@ pub(super) fn part_along(
     let normal = if flatter.0 > STEEP { flatter.1 } else { away };
     for corner in overlap(&upper, &lower, normal).iter().filter(|c| c.height < gap) {
         let target = gap.min(corner.height + longest_step);
-        found.push(Contact::face_points((first, corner.at_upper), (second, corner.at_lower), normal, target));
+        found.push(Condition::face_points(
+            (first, corner.at_upper),
+            (second, corner.at_lower),
+            normal,
+            target,
+        ));
     }
 }
 
@@ -197,14 +193,14 @@ pub(super) fn part_from_body(
     positions: &[[f64; 3]],
     ground: &Triangle,
     (gap, longest_step): (f64, f64),
-    found: &mut Vec<Contact>,
+    found: &mut Vec<Condition>,
 ) {
     let (upper, normal) = (face.map(|v| positions[v as usize]), normal_of(ground));
     // Of the ground under a corner, as a height along the normal.
     let level = dot(normal, ground[0]);
     for corner in overlap(&upper, ground, normal).iter().filter(|corner| corner.height < gap) {
         let target = level + gap.min(corner.height + longest_step);
-        found.push(Contact::face_point(face, corner.at_upper, normal, target));
+        found.push(Condition::new(face, corner.at_upper, normal, target));
     }
 }
 
@@ -212,7 +208,7 @@ pub(super) fn part_from_body(
 /// body's surface, zero where unknown) say for a component, smoothed over wrinkles. Unlike the direction from the nearest
 /// point of the body they do not change where cloth has gone through other cloth towards another part of the body.
 pub(super) fn outward(
-    outfit: &Outfit<'_>,
+    outfit: &PackedCloth<'_>,
     positions: &[[f64; 3]],
     away: impl Fn(u32) -> [f64; 3],
 ) -> Vec<[f64; 3]> {

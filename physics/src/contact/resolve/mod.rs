@@ -1,6 +1,6 @@
 //! The post-process: separates draped garments from the body and from each other, and certifies the result.
 //!
-//! All garments of an outfit are resolved together, so that an outer one can move an inner one. The fast pass ([`fast_pass()`])
+//! All garments of an outfit are resolved together, so that an outer one can move an inner one. The fast pass ([`fast_pass`])
 //! separates slight intersections. What it does not clear goes on:
 //!
 //! 1. **Vertices.** The closest point of the body (of the union of its parts, [`crate::query::UnionDistance`]) gives a vertex a
@@ -34,7 +34,7 @@ mod body;
 mod budget;
 mod certificate;
 mod clearance;
-mod contact;
+mod condition;
 mod contact_orientation;
 mod continuation;
 mod count;
@@ -46,16 +46,16 @@ mod garment;
 mod layer_constraint;
 mod near;
 mod obstacle;
-mod outfit;
+mod packed_cloth;
 mod path;
 mod path_sample;
-mod path_samples;
 mod relax;
 mod resolved;
 mod self_intersections;
 mod settings;
 mod step_lengths;
 mod strain_relaxation;
+mod task;
 #[cfg(test)]
 mod tests;
 mod untangle;
@@ -68,9 +68,7 @@ pub use continuation::{resolve_after, resolve_along};
 pub use count::certify;
 pub use defects::Defects;
 pub use error::ResolveError;
-pub use fast_pass::fast_pass;
-use fast_pass::passed_near;
-pub use garment::{FARTHEST, Layer, RestGarment};
+pub use garment::{FARTHEST_POSITION, Layer, RestGarment};
 pub use path_sample::{ContactState, PathSample};
 pub use resolved::{GarmentWork, Resolved};
 pub use settings::ResolveSettings;

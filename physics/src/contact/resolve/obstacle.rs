@@ -1,10 +1,12 @@
 //! The posed body as what garments have to stay outside of.
 
-use super::contact::{Plane, along_line, normal_of};
-use super::near::MARGIN;
+use super::Layer;
+use super::condition::{Plane, along_line, normal_of};
+use super::garment::triangles;
+use super::near::{NEAR_MARGIN, near_cloth};
 use crate::contact::{Triangle, TriangleTree};
 use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint, UnionDistance};
-use crate::vec3::{add, add_scaled, dot, scale, sub};
+use crate::vec3::{add, add_scaled, bounds, dot, scale, sub};
 use std::sync::OnceLock;
 
 /// Below this distance (m) the direction from the closest point is rounding.
@@ -37,18 +39,23 @@ pub(super) struct BodyObstacle<'a> {
     all: OnceLock<ClosestPoint>,
     pub surface: &'a Surface<f64>,
     /// Vertices near cloth.
-    pub near: &'a [bool],
+    pub near: Vec<bool>,
 }
 
 impl<'a> BodyObstacle<'a> {
+    /// The body as it is drawn, near `layers`: the same garments once or, at several positions, more often.
+    pub fn near_layers(surface: &'a Surface<f64>, layers: &[Layer<'_>]) -> Self {
+        Self::new(surface, near_cloth(&surface.positions, &surface.faces, &triangles(layers)))
+    }
+
     /// The body as it is drawn; `near`: vertices near cloth.
-    pub fn new(surface: &'a Surface<f64>, near: &'a [bool]) -> Self {
+    pub fn new(surface: &'a Surface<f64>, near: Vec<bool>) -> Self {
         Self::pinched_where(surface, near, |_| true)
     }
 
     pub(super) fn pinched_where(
         surface: &'a Surface<f64>,
-        near: &'a [bool],
+        near: Vec<bool>,
         may_be: impl Fn(u32) -> bool,
     ) -> Self {
         let faces = &surface.faces;
@@ -102,7 +109,7 @@ impl<'a> BodyObstacle<'a> {
             }
         };
         let far = found.distance_squared.sqrt();
-        if far >= MARGIN {
+        if far >= NEAR_MARGIN {
             // The nearest face may not be near cloth, and the normal of another one says nothing.
             is_inside = self.union.as_ref().is_some_and(|union| union.winding_number(p) >= 1);
         }
@@ -113,28 +120,38 @@ impl<'a> BodyObstacle<'a> {
         let plane = if is_inside && (is_pinched || self.is_pinch(p)) {
             None
         } else {
-            Some(Plane::at(&found, direction, distance, is_pinched))
+            let offset = dot(direction, found.position);
+            Some(Plane { normal: direction, offset, distance, is_held: is_pinched })
         };
         Some(BodyView { far, plane })
     }
-}
 
-impl BodyObstacle<'_> {
+    /// The half-space that the body leaves to `p`, where `plane` is that of the nearest way out: more than half way through a limb
+    /// that is the limb's other side, and cloth goes back to its own, `away` from the body, at most `farthest` (m).
+    pub fn back_from_through(
+        &self,
+        plane: Option<Plane>,
+        p: [f64; 3],
+        away: [f64; 3],
+        farthest: f64,
+    ) -> Option<Plane> {
+        let is_through = plane.is_some_and(|plane| plane.distance < 0.0 && dot(plane.normal, away) < 0.0);
+        if is_through { self.exit(p, away, farthest).or(plane) } else { plane }
+    }
+
     /// The half-space a point inside the body has to reach by `way` (unit), at most `reach` (m) along it: that of the first
     /// surface there. `None` where there is none, or where it is pinched.
-    pub fn exit(&self, p: [f64; 3], way: [f64; 3], reach: f64) -> Option<Plane> {
-        let end = add_scaled(p, reach, way);
-        let low = std::array::from_fn(|k| p[k].min(end[k]));
-        let high = std::array::from_fn(|k| p[k].max(end[k]));
+    fn exit(&self, p: [f64; 3], way: [f64; 3], reach: f64) -> Option<Plane> {
         let leaves = |f: u32| {
             let triangle = self.tree.triangle(f)?;
             let normal = normal_of(&triangle);
             let (far, _) = along_line(p, way, &triangle)?;
             ((0.0..=reach).contains(&far) && dot(normal, way) > 0.0).then_some((far, f, normal))
         };
+        let along = self.tree.faces_in_box(bounds([p, add_scaled(p, reach, way)]));
         let nearest =
             |a: &(f64, u32, [f64; 3]), b: &(f64, u32, [f64; 3])| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-        let (far, f, normal) = self.tree.faces_in_box(low, high).filter_map(leaves).min_by(nearest)?;
+        let (far, f, normal) = along.filter_map(leaves).min_by(nearest)?;
         let distance = -far * dot(normal, way);
         let offset = dot(normal, p) - distance;
         (!self.is_pinched(f)).then_some(Plane { normal, offset, distance, is_held: false })
@@ -156,14 +173,14 @@ mod tests {
     fn a_point_far_from_the_body_is_outside() {
         let body = Surface::from_mesh(&shapes::icosphere(0.5, 3));
         let near: Vec<bool> = body.positions.iter().map(|p| p[0] > 0.3).collect();
-        let obstacle = BodyObstacle::new(&body, &near);
+        let obstacle = BodyObstacle::new(&body, near);
         let behind = obstacle.look([-0.8, 0.1, 0.0]).unwrap();
-        assert!(behind.plane.unwrap().distance > MARGIN);
+        assert!(behind.plane.unwrap().distance > NEAR_MARGIN);
         let deep = obstacle.look([-0.1, 0.1, 0.0]).unwrap();
-        assert!(deep.plane.unwrap().distance < -MARGIN);
+        assert!(deep.plane.unwrap().distance < -NEAR_MARGIN);
         let open = Surface::from_mesh(&shapes::grid(0.2, 0.2, 4, 4));
         let all = vec![true; open.positions.len()];
-        let under = BodyObstacle::new(&open, &all).look([0.1, 0.1, -0.5]).unwrap();
+        let under = BodyObstacle::new(&open, all).look([0.1, 0.1, -0.5]).unwrap();
         assert!(under.plane.unwrap().distance > 0.0, "no inside is known so far from an open surface");
     }
 }

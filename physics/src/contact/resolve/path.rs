@@ -2,16 +2,16 @@
 
 use std::sync::OnceLock;
 
-use super::attempt::{FEW, settled};
-use super::body::{Body, with_body_after, with_drawn};
-use super::budget::Budget;
-use super::clearance::{Before, Clearance};
+use super::attempt::{FEW_PAIRS, settled};
+use super::body::SoftBody;
+use super::clearance::{Before, YieldedBody};
 use super::contact_orientation::ContactOrientation;
 use super::garment::{at, check};
 use super::obstacle::BodyObstacle;
-use super::outfit::Outfit;
+use super::packed_cloth::PackedCloth;
 use super::step_lengths::StepLengths;
-use super::untangle::{Untangled, untangled, untangled_keeping};
+use super::task::Task;
+use super::untangle::{Untangled, untangled};
 use super::{ContactState, Layer, PathSample, ResolveError, ResolveSettings, Resolved};
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
@@ -22,7 +22,7 @@ const FAILURES: usize = 3;
 /// Steps that do not raise the number of intersections after which a longer one is tried.
 const GOOD_STEPS: usize = 4;
 /// Share of the post-process's changes that a long step keeps, so that old changes fade…
-const KEPT: f64 = 0.95;
+const KEPT_CHANGES: f64 = 0.95;
 /// …and the share of the path from which on a step is long: shorter ones keep more.
 const FADING: f64 = 1.0 / 16.0;
 /// Most that the body's yield changes on a whole path (m): about as fast as limbs move.
@@ -30,11 +30,9 @@ const YIELD_PER_PATH: f64 = 0.5;
 
 /// A path, and what its steps need.
 pub(super) struct Path<'a, 'b> {
-    pub layers: &'a [Layer<'a>],
+    pub task: Task<'a>,
     /// The body at 1.
-    pub end: &'a Body<'b>,
-    pub settings: &'a ResolveSettings,
-    pub budget: &'a Budget,
+    pub end: &'a SoftBody<'b>,
     pub step_lengths: StepLengths,
 }
 
@@ -64,7 +62,7 @@ impl PathNode {
     fn orientation(&self, layers: &[Layer<'_>]) -> &ContactOrientation {
         let positions = || self.state.positions.concat();
         self.orientation.get_or_init(|| {
-            ContactOrientation::of(&Outfit::new(layers), &positions(), self.orientation_before.as_ref())
+            ContactOrientation::of(&PackedCloth::new(layers), &positions(), self.orientation_before.as_ref())
         })
     }
 }
@@ -85,27 +83,23 @@ impl Path<'_, '_> {
         t_pose: PathSample,
         sample_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(), E> {
-        if self.budget.is_nearly_spent() {
+        let Task { layers, budget, .. } = self.task;
+        if budget.is_nearly_spent() {
             return Ok(());
         }
-        let (layers, settings) = (self.layers, self.settings);
-        let first = at_sample(
-            layers,
-            &t_pose,
-            &t_pose.draped,
-            (self.step_lengths.clearance, None),
-            |obstacle, start| untangled(obstacle, start, settings, self.budget),
-        );
+        let first = self.at_sample(&t_pose, &t_pose.draped, None, |obstacle, layers| {
+            untangled(obstacle, Task { layers, ..self.task }, None)
+        });
         let intersections = first.untangled.intersections;
         if intersections > 0 && intersections >= best.certificate.intersections() {
             return Ok(());
         }
-        let most = best.certificate.intersections().max(FEW);
+        let most = best.certificate.intersections().max(FEW_PAIRS);
         let (followed, steps) = self.go(PathNode::new(t_pose, first, None), most, sample_at)?;
         best.steps += steps;
         let Some(found) = followed else { return Ok(()) };
-        let mut along = settled(self.end, layers, found, settings, self.step_lengths.clearance, self.budget);
-        along.go_on(self.end.drawn.surface, layers, settings, self.budget);
+        let mut along = settled(self.end, found, self.step_lengths.clearance, self.task);
+        along.go_on(self.end.drawn.surface, self.task);
         best.prefer(layers, along.positions, along.certificate);
         Ok(())
     }
@@ -133,15 +127,15 @@ impl Path<'_, '_> {
         mut sample_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
         let StepLengths { longest, shortest, .. } = self.step_lengths;
-        check(self.end.drawn.surface, &placed(self.layers, &node.state.draped)?)?;
-        check(self.end.drawn.surface, &placed(self.layers, &node.state.positions)?)?;
+        let Task { layers, settings, budget } = self.task;
+        check(self.end.drawn.surface, &placed(layers, &node.state.draped)?)?;
+        check(self.end.drawn.surface, &placed(layers, &node.state.positions)?)?;
         let (mut from, mut step, mut steps) = (0.0, longest, 0);
         // Successful steps in a row, and shortest steps that failed since the last state without intersections: the next step
         // mends most of what such a step leaves.
         let (mut well, mut failures) = (0, 0);
-        while steps < self.settings.steps && !self.budget.is_spent() {
-            let is_last =
-                failures >= FAILURES || steps + 1 == self.settings.steps || self.budget.is_nearly_spent();
+        while steps < settings.steps && !budget.is_spent() {
+            let is_last = failures >= FAILURES || steps + 1 == settings.steps || budget.is_nearly_spent();
             let is_shortest = is_last || step <= shortest * (1.0 + 1e-9);
             let at = if is_last || step > 1.0 - from - 1e-9 { 1.0 } else { from + step };
             let sample = sample_at(at)?;
@@ -183,50 +177,47 @@ impl Path<'_, '_> {
         is_shortest: bool,
         is_last: bool,
     ) -> Result<StepResult, ResolveError> {
+        let Task { layers, settings, .. } = self.task;
         // A step that may be halved is not worth a second attempt.
-        let loosened = if is_shortest { self.settings.loosened } else { 1.0 };
+        let loosened = if is_shortest { settings.loosened } else { 1.0 };
         let settings =
-            ResolveSettings { is_shallow: !is_last, is_patient: is_shortest, loosened, ..*self.settings };
-        let kept = KEPT.powf((step / FADING).min(1.0));
+            &ResolveSettings { is_shallow: !is_last, is_patient: is_shortest, loosened, ..*settings };
+        let kept = KEPT_CHANGES.powf((step / FADING).min(1.0));
         let start = carried(&node.state, sample, kept);
-        check(&sample.body, &placed(self.layers, &start)?)?;
-        let StepLengths { keeping, always_keeps, clearance, .. } = self.step_lengths;
+        check(&sample.body, &placed(layers, &start)?)?;
+        let StepLengths { keeping, always_keeps, .. } = self.step_lengths;
         let before = node.yielded.as_ref().map(|steps| Before { steps, most: YIELD_PER_PATH * step });
-        let layers = self.layers;
-        Ok(at_sample(layers, sample, &start, (clearance, before), |obstacle, start| {
-            let first =
-                (step > keeping || !always_keeps).then(|| untangled(obstacle, start, &settings, self.budget));
+        Ok(self.at_sample(sample, &start, before, |obstacle, start| {
+            let task = Task { layers: start, settings, ..self.task };
+            let first = (step > keeping || !always_keeps).then(|| untangled(obstacle, task, None));
             match first {
                 Some(found) if step > keeping || found.intersections == 0 => return found,
                 _ => (),
             }
-            let kept =
-                untangled_keeping(Some(node.orientation(layers)), obstacle, start, &settings, self.budget);
+            let kept = untangled(obstacle, task, Some(node.orientation(layers)));
             match first {
                 Some(found) if found.defects() < kept.defects() => found,
                 _ => kept,
             }
         }))
     }
-}
 
-/// Untangles the garments at `sample` by `untangle`, from `start`. The body yields about as `before`.
-fn at_sample(
-    layers: &[Layer<'_>],
-    sample: &PathSample,
-    start: &[Vec<[f64; 3]>],
-    (clearance, before): (Clearance, Option<Before<'_>>),
-    untangle: impl FnOnce(&BodyObstacle<'_>, &[Layer<'_>]) -> Untangled,
-) -> StepResult {
-    let start = at(layers, start);
-    let places = [at(layers, &sample.draped), start.clone()].concat();
-    let step_to = |body: &Body<'_>| {
-        let untangled = untangle(body.obstacle(), &start);
-        StepResult { untangled, yielded: body.steps() }
-    };
-    with_drawn(&sample.body, &places, |drawn| {
-        with_body_after(clearance, before, drawn, layers.len(), step_to)
-    })
+    /// Untangles the garments at `sample` by `untangle`, from `start`. The body yields about as `before`.
+    fn at_sample(
+        &self,
+        sample: &PathSample,
+        start: &[Vec<[f64; 3]>],
+        before: Option<Before<'_>>,
+        untangle: impl FnOnce(&BodyObstacle<'_>, &[Layer<'_>]) -> Untangled,
+    ) -> StepResult {
+        let layers = self.task.layers;
+        let start = at(layers, start);
+        let places = [at(layers, &sample.draped), start.clone()].concat();
+        let drawn = BodyObstacle::near_layers(&sample.body, &places);
+        let yielded = YieldedBody::of(&drawn, layers.len(), self.step_lengths.clearance, before);
+        let body = SoftBody::new(drawn, layers.len(), yielded.as_ref());
+        StepResult { untangled: untangle(body.obstacle(), &start), yielded: body.steps() }
+    }
 }
 
 /// The garments at other positions, if there are positions for all.

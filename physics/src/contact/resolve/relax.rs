@@ -1,7 +1,7 @@
 //! The smooth step that meets contacts: of all displacements, one that changes little from vertex to vertex.
 
-use super::contact::Contact;
-use super::outfit::Outfit;
+use super::condition::Condition;
+use super::packed_cloth::PackedCloth;
 use crate::vec3::{add, add_scaled, norm, scale, sub};
 
 /// How much of a neighbourhood's mean displacement a vertex takes over: below 1, so that a push fades with distance (to a
@@ -36,11 +36,11 @@ impl LastPasses {
 /// keeps its edge lengths, and is left as it is outside. Gauss–Seidel in a fixed order: smoothing, lengths, contacts; in the end
 /// as many passes over the contacts alone as `last` allows.
 pub(super) fn relax(
-    cloth: &Outfit<'_>,
+    cloth: &PackedCloth<'_>,
     positions: &mut [[f64; 3]],
     shape: &[[f64; 3]],
     region: &[u32],
-    contacts: &[Contact],
+    contacts: &[Condition],
     stretch: f64,
     (sweeps, last): (usize, LastPasses),
 ) {

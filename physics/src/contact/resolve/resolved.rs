@@ -75,7 +75,7 @@ impl Resolved {
 
     /// Sets moves and strain relative to `layers`, and the time that `budget` counted.
     pub(super) fn compare_since(&mut self, layers: &[Layer<'_>], budget: &Budget) {
-        (self.body_time, self.certificate_time) = (budget.body_time(), budget.certificate_time());
+        (self.body_time, self.certificate_time) = (budget.body_time.get(), budget.certificate_time.get());
         let time = budget.elapsed().saturating_sub(self.body_time + self.certificate_time);
         self.rounds = budget.spent();
         let count: usize = self.positions.iter().map(Vec::len).sum();

@@ -7,8 +7,9 @@
 use std::collections::HashMap;
 
 use super::RestGarment;
-use super::contact::{Contact, is_tiny, normal_of, overlap};
-use super::outfit::Outfit;
+use super::condition::{Condition, is_tiny, normal_of, overlap};
+use super::packed_cloth::PackedCloth;
+use crate::mesh::DisjointSets;
 use crate::vec3::{add, cross, dot, neg, scale, sub};
 
 /// Rings around an intersection that are counted to find the smaller side.
@@ -18,7 +19,7 @@ const COUNTED_RINGS: usize = 10;
 #[derive(Debug, Default)]
 pub(super) struct PartingConditions {
     /// Conditions that part two sheets.
-    pub contacts: Vec<Contact>,
+    pub contacts: Vec<Condition>,
     /// Vertices of crumples, to be smoothed.
     pub crumpled: Vec<u32>,
 }
@@ -32,11 +33,9 @@ fn parting_conditions(
 ) -> PartingConditions {
     let mut found = PartingConditions::default();
     let faces = &garment.faces;
-    let sheets = Sheets::new(garment, pairs);
     let mut intersections: HashMap<(u32, u32), Vec<(u32, u32)>> = HashMap::new();
     let mut order: Vec<(u32, u32)> = Vec::new();
-    for &(f, g) in pairs {
-        let (a, b) = (sheets.of(f), sheets.of(g));
+    for (&(f, g), (a, b)) in pairs.iter().zip(sheets(garment, pairs)) {
         if a == b {
             found.crumpled.extend(faces[f as usize].iter().chain(&faces[g as usize]));
             continue;
@@ -67,12 +66,12 @@ fn parting_conditions(
 /// crumples. Those are smoothed: in positions and shape where a garment has a pair `known` from the input; otherwise towards the
 /// shape.
 pub(super) fn part_self_intersections(
-    outfit: &Outfit<'_>,
+    outfit: &PackedCloth<'_>,
     (pairs, known): (&[(u32, u32)], &[(u32, u32)]),
     gap: f64,
     positions: &[[f64; 3]],
     (smoothed, shape): (&mut [[f64; 3]], &mut [[f64; 3]]),
-) -> (Vec<Contact>, Vec<u32>) {
+) -> (Vec<Condition>, Vec<u32>) {
     let (mut contacts, mut crumpled) = (Vec::new(), Vec::new());
     for pairs in pairs.chunk_by(|a, b| outfit.garment_of_face(a.0) == outfit.garment_of_face(b.0)) {
         let g = outfit.garment_of_face(pairs[0].0);
@@ -101,41 +100,20 @@ pub(super) fn part_self_intersections(
     (contacts, crumpled)
 }
 
-/// Connected components of the intersecting faces.
-struct Sheets {
-    root_of: HashMap<u32, u32>,
-}
-
-impl Sheets {
-    fn new(garment: &RestGarment, pairs: &[(u32, u32)]) -> Self {
-        let mut all: Vec<u32> = pairs.iter().flat_map(|&(f, g)| [f, g]).collect();
-        all.sort_unstable();
-        all.dedup();
-        let is_in = |f: u32| all.binary_search(&f).is_ok();
-        let mut root_of: HashMap<u32, u32> = HashMap::new();
-        for &start in &all {
-            if root_of.contains_key(&start) {
-                continue;
-            }
-            root_of.insert(start, start);
-            let mut front = vec![start];
-            while let Some(f) = front.pop() {
-                for &v in &garment.faces[f as usize] {
-                    for &next in garment.faces_of(v).iter().filter(|&&next| is_in(next)) {
-                        root_of.entry(next).or_insert_with(|| {
-                            front.push(next);
-                            start
-                        });
-                    }
-                }
-            }
+/// The connected components of the intersecting faces: for every pair the numbers of the sheets of its faces.
+fn sheets(garment: &RestGarment, pairs: &[(u32, u32)]) -> Vec<(u32, u32)> {
+    let mut all: Vec<u32> = pairs.iter().flat_map(|&(f, g)| [f, g]).collect();
+    all.sort_unstable();
+    all.dedup();
+    let number = |f: u32| all.binary_search(&f).ok().map(|number| number as u32);
+    let mut sheets = DisjointSets::new(all.len());
+    for (f, &face) in (0u32..).zip(&all) {
+        for &v in &garment.faces[face as usize] {
+            garment.faces_of(v).iter().filter_map(|&g| number(g)).for_each(|g| sheets.join(f, g));
         }
-        Self { root_of }
     }
-
-    fn of(&self, f: u32) -> u32 {
-        self.root_of.get(&f).copied().unwrap_or(f)
-    }
+    let mut sheet_of = |f: u32| number(f).map_or(f, |number| sheets.root(number));
+    pairs.iter().map(|&(f, g)| (sheet_of(f), sheet_of(g))).collect()
 }
 
 /// How clearly the sheet of the first faces belongs above (positive) or below that of the second ones: its vertices above minus
@@ -193,8 +171,8 @@ fn part(
     for corner in overlap(&upper, &lower, normal) {
         let sides = ((face, corner.at_upper), (other, corner.at_lower));
         let contact = match is_below {
-            false if corner.height < gap => Contact::face_points(sides.0, sides.1, normal, gap),
-            true if corner.height > -gap => Contact::face_points(sides.0, sides.1, neg(normal), gap),
+            false if corner.height < gap => Condition::face_points(sides.0, sides.1, normal, gap),
+            true if corner.height > -gap => Condition::face_points(sides.0, sides.1, neg(normal), gap),
             _ => continue,
         };
         found.contacts.push(contact);

@@ -11,18 +11,10 @@ pub struct ResolveSettings {
     /// the same over an inner garment, half of it where triangles intersect; three tenths between parts of the body that are too
     /// near to each other for more. Default 1 mm.
     pub gap: f64,
-    /// A vertex has to move where its distance is below this share of `gap`, 0–1. Default 0.25: whatever was resolved once
-    /// stays as it is.
-    pub trigger: f64,
     /// Rings of neighbours around a violation that move along. Default 5.
     pub rings: usize,
     /// Most rounds of detection and relaxation in an attempt. Default 24.
     pub rounds: usize,
-    /// Sweeps of the relaxation in a round. Default 20.
-    pub sweeps: usize,
-    /// Deepest that an outer vertex may lie below an inner layer and still be brought back over it (m). Default 5 cm, as far as
-    /// the order of layers is judged.
-    pub reach: f64,
     /// Farthest that any vertex may be moved (m). Default 6 cm: what asks for more (an order that is not feasible, a part of the
     /// body inside another one) would stretch the garment beyond use, and is left and listed.
     pub farthest: f64,
@@ -56,11 +48,8 @@ impl Default for ResolveSettings {
     fn default() -> Self {
         Self {
             gap: 1e-3,
-            trigger: 0.25,
             rings: 5,
             rounds: 24,
-            sweeps: 20,
-            reach: super::super::ORDER_RADIUS,
             farthest: 0.06,
             stretch: 1.15,
             loosened: 6.0,
@@ -75,6 +64,11 @@ impl Default for ResolveSettings {
 }
 
 impl ResolveSettings {
+    /// A vertex has to move where it is nearer than this (m), a quarter of the gap: whatever was resolved once stays as it is.
+    pub(super) fn least_gap(&self) -> f64 {
+        0.25 * self.gap
+    }
+
     /// The largest `gap` (m).
     pub const LARGEST_GAP: f64 = 0.05;
 
@@ -84,33 +78,20 @@ impl ResolveSettings {
     /// [`ResolveError::Setting`] names the first that is out of range.
     pub fn check(&self) -> Result<(), ResolveError> {
         let fail = |setting, value, expected| Err(ResolveError::Setting { setting, value, expected });
-        if !(self.gap > 0.0 && self.gap <= Self::LARGEST_GAP) {
-            return fail("gap", self.gap, "greater than 0 and at most 0.05 m");
+        let in_range = |value: f64, most: f64| value > 0.0 && value <= most;
+        for (setting, value, is_valid, expected) in [
+            ("gap", self.gap, in_range(self.gap, Self::LARGEST_GAP), "greater than 0 and at most 0.05 m"),
+            ("farthest", self.farthest, in_range(self.farthest, 10.0), "greater than 0 and at most 10 m"),
+            ("stretch", self.stretch, (1.0..=100.0).contains(&self.stretch), "between 1 and 100"),
+            ("loosened", self.loosened, (1.0..=100.0).contains(&self.loosened), "between 1 and 100"),
+        ] {
+            if !is_valid {
+                return fail(setting, value, expected);
+            }
         }
-        if !(0.0..=1.0).contains(&self.trigger) {
-            return fail("trigger", self.trigger, "between 0 and 1");
-        }
-        if !(self.reach >= 0.0 && self.reach <= 0.5) {
-            return fail("reach", self.reach, "between 0 and 0.5 m");
-        }
-        if !(self.farthest > 0.0 && self.farthest <= 10.0) {
-            return fail("farthest", self.farthest, "greater than 0 and at most 10 m");
-        }
-        if !(self.stretch >= 1.0 && self.stretch <= 100.0) {
-            return fail("stretch", self.stretch, "between 1 and 100");
-        }
-        if !(self.loosened >= 1.0 && self.loosened <= 100.0) {
-            return fail("loosened", self.loosened, "between 1 and 100");
-        }
-        for (setting, value, most) in
-            [("rings", self.rings, 1000), ("rounds", self.rounds, 10_000), ("sweeps", self.sweeps, 10_000)]
-        {
+        for (setting, value, most) in [("rings", self.rings, 1000), ("rounds", self.rounds, 10_000)] {
             if !(1..=most).contains(&value) {
-                return fail(
-                    setting,
-                    value as f64,
-                    "at least 1 and at most 1000 rings, 10000 rounds or sweeps",
-                );
+                return fail(setting, value as f64, "at least 1 and at most 1000 rings or 10000 rounds");
             }
         }
         Ok(())

@@ -4,18 +4,18 @@
 //! the strain energy has risen in the end, small moves bring edges towards their rest lengths. Each move passes the step filter,
 //! so that it makes no intersection, and is taken if the energy falls.
 
+use super::Resolved;
 use super::budget::Budget;
 use super::certificate::strain_joule;
 use super::count::certified;
 use super::garment::{at, triangles};
 use super::near::near_cloth;
 use super::obstacle::BodyObstacle;
-use super::outfit::Outfit;
+use super::packed_cloth::PackedCloth;
 use super::relax::{keep_length, no_farther};
-use super::{Layer, ResolveSettings, Resolved};
+use super::task::Task;
 use crate::contact::step_filter::{ContactMesh, StepFilter};
 use crate::vec3::distance_squared;
-use std::time::Instant;
 
 /// Most moves.
 pub(super) const TIMES: usize = 20;
@@ -23,49 +23,34 @@ pub(super) const TIMES: usize = 20;
 pub(super) const TIMES_IN_FRAME: usize = 2;
 /// Where relaxing edges that are too long lowers the energy by a smaller share of what it had risen by, those that are too short
 /// are relaxed as well, which crumples cloth a little; where that lowers it by less, it ends.
-const LEAST_GAIN: f64 = 0.02;
+const LEAST_RELAXED: f64 = 0.02;
 /// Passes over the edges in a move.
 const PASSES: usize = 20;
 /// Farthest that a vertex is moved at once (m).
-const FARTHEST: f64 = 0.002;
+const FARTHEST_AT_ONCE: f64 = 0.002;
 
 impl Resolved {
-    /// Whether the strain energy has risen from that of `layers`.
-    pub(super) fn is_strained(&self, layers: &[Layer<'_>]) -> bool {
-        self.certificate.strain_joule() > strain_joule(layers)
-    }
-
-    /// Lowers the strain energy where it has risen from that of `layers`, by at most so many moves (`times`) of what was moved
-    /// before, none of which makes an intersection. Strict limits (`settings.loosened`) allow none of this, nor does a `budget`
-    /// of which the time is over.
-    pub(super) fn relax_strain(
-        &mut self,
-        drawn: &BodyObstacle<'_>,
-        layers: &[Layer<'_>],
-        settings: &ResolveSettings,
-        budget: &Budget,
-        times: usize,
-    ) {
-        let is_late = || budget.is_late();
-        if settings.loosened <= 1.0 || !self.is_strained(layers) || is_late() {
+    /// Lowers the strain energy where it has risen from that before the post-process, by at most so many moves (`times`) of what
+    /// was moved before, none of which makes an intersection. Strict limits (`settings.loosened`) allow none of this, nor does a
+    /// budget of which the time is over.
+    pub(super) fn relax_strain(&mut self, drawn: &BodyObstacle<'_>, task: Task<'_>, times: usize) {
+        let Task { layers, settings, budget } = task;
+        let has_risen = self.certificate.strain_joule() > strain_joule(layers);
+        if settings.loosened <= 1.0 || !has_risen || budget.is_late() {
             return;
         }
         let surface = drawn.surface;
-        let now = at(layers, &self.positions);
-        let near = near_cloth(&surface.positions, &surface.faces, &triangles(&now));
+        let near = near_cloth(&surface.positions, &surface.faces, &triangles(&at(layers, &self.positions)));
         let is_near = |face: &&[u32; 3]| face.iter().any(|&v| near[v as usize]);
-        let outfit = Outfit::new(layers);
+        let outfit = PackedCloth::new(layers);
         let mesh = contact_mesh(&outfit, surface.positions.len(), surface.faces.iter().filter(is_near));
         let mut positions = self.positions.concat();
         positions.extend(&surface.positions);
         let mut filter = StepFilter::new(&mesh, &positions);
-        StrainRelaxation::new(&outfit, settings).relax_strain(&mut filter, &mut positions, times, is_late);
-        let relaxed: Vec<Vec<[f64; 3]>> =
-            (0..outfit.len()).map(|g| outfit.part(&positions, g).to_vec()).collect();
+        StrainRelaxation::new(&outfit, task).relax_strain(&mut filter, &mut positions, times);
+        let relaxed = outfit.split(&positions);
         if relaxed != self.positions {
-            let clock = Instant::now();
-            self.certificate = certified(drawn, layers, &relaxed);
-            budget.count_certificate(clock);
+            self.certificate = budget.certifying(|| certified(drawn, layers, &relaxed));
             self.positions = relaxed;
         }
     }
@@ -73,7 +58,7 @@ impl Resolved {
 
 /// The faces of an outfit and some of a body with so many vertices.
 pub(super) fn contact_mesh<'a>(
-    outfit: &Outfit<'_>,
+    outfit: &PackedCloth<'_>,
     body_vertices: usize,
     body_faces: impl Iterator<Item = &'a [u32; 3]>,
 ) -> ContactMesh {
@@ -85,27 +70,22 @@ pub(super) fn contact_mesh<'a>(
 /// Garments whose edges relax.
 pub(super) struct StrainRelaxation<'a> {
     /// The garments as they were before the post-process.
-    outfit: &'a Outfit<'a>,
+    outfit: &'a PackedCloth<'a>,
     /// What elements stay apart (m).
     margin: f64,
+    budget: &'a Budget,
     /// Whether edges that are too short stay so.
     only_stretched: bool,
 }
 
 impl<'a> StrainRelaxation<'a> {
-    pub fn new(outfit: &'a Outfit<'a>, settings: &ResolveSettings) -> Self {
-        Self { outfit, margin: settings.trigger * settings.gap, only_stretched: true }
+    pub fn new(outfit: &'a PackedCloth<'a>, Task { settings, budget, .. }: Task<'a>) -> Self {
+        Self { outfit, margin: settings.least_gap(), budget, only_stretched: true }
     }
 
     /// Relaxes the garments at the start of `positions`, those of the `filter`, until their strain energy is what it was before
-    /// the post-process, a move gains too little, or `is_late`.
-    pub fn relax_strain(
-        mut self,
-        filter: &mut StepFilter<'_>,
-        positions: &mut Vec<[f64; 3]>,
-        times: usize,
-        is_late: impl Fn() -> bool,
-    ) {
+    /// the post-process, a move gains too little, or the time is over.
+    pub fn relax_strain(mut self, filter: &mut StepFilter<'_>, positions: &mut Vec<[f64; 3]>, times: usize) {
         let before = strain_joule(self.outfit.layers);
         let mut now = self.strain(positions);
         if now <= before {
@@ -114,7 +94,7 @@ impl<'a> StrainRelaxation<'a> {
         let may_move = self.may_move(filter, positions);
         let edges = self.edges(&may_move);
         for _ in 0..times {
-            if now <= before || is_late() {
+            if now <= before || self.budget.is_late() {
                 break;
             }
             let mut relaxed = self.moved(&edges, &may_move, positions);
@@ -126,7 +106,7 @@ impl<'a> StrainRelaxation<'a> {
             } else {
                 filter.step_freely(&relaxed, positions);
             }
-            if gain < LEAST_GAIN && !std::mem::take(&mut self.only_stretched) {
+            if gain < LEAST_RELAXED && !std::mem::take(&mut self.only_stretched) {
                 break;
             }
         }
@@ -164,7 +144,7 @@ impl<'a> StrainRelaxation<'a> {
             }
         }
         for (p, q) in positions.iter().zip(&mut moved) {
-            *q = no_farther(*p, *q, FARTHEST);
+            *q = no_farther(*p, *q, FARTHEST_AT_ONCE);
         }
         moved
     }
@@ -189,8 +169,7 @@ impl<'a> StrainRelaxation<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::body::with_drawn;
-    use super::super::{RestGarment, certify};
+    use super::super::{Layer, ResolveSettings, RestGarment, certify};
     use super::*;
     use crate::mesh::shapes::{self, SplitMix};
     use crate::query::Surface;
@@ -230,15 +209,9 @@ mod tests {
         let certificate = certify(&body, &at(&layers, &crumpled)).unwrap();
         assert_eq!(certificate.pairs(), 0);
         let mut resolved = Resolved { positions: crumpled, certificate, ..Resolved::default() };
-        with_drawn(&body, &layers, |drawn| {
-            resolved.relax_strain(
-                &drawn,
-                &layers,
-                &ResolveSettings::default(),
-                &Budget::new(&ResolveSettings::default(), 1),
-                TIMES,
-            );
-        });
+        let (drawn, settings) = (BodyObstacle::near_layers(&body, &layers), &ResolveSettings::default());
+        let task = Task { layers: &layers, settings, budget: &Budget::new(settings, 1) };
+        resolved.relax_strain(&drawn, task, TIMES);
         let after = garment.strain_energy(&resolved.positions[0]);
         assert!(after < 0.1 * before, "{before} {after}");
         let found = certify(&body, &at(&layers, &resolved.positions)).unwrap();
@@ -261,9 +234,8 @@ mod tests {
             let positions = vec![now.clone()];
             let certificate = certify(&body, &at(&layers, &positions)).unwrap();
             let mut resolved = Resolved { positions, certificate, ..Resolved::default() };
-            with_drawn(&body, &layers, |drawn| {
-                resolved.relax_strain(&drawn, &layers, &settings, &Budget::new(&settings, 1), TIMES);
-            });
+            let task = Task { layers: &layers, settings: &settings, budget: &Budget::new(&settings, 1) };
+            resolved.relax_strain(&BodyObstacle::near_layers(&body, &layers), task, TIMES);
             assert_eq!(resolved.positions[0] != *now, is_eased);
         }
     }

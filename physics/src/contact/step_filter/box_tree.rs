@@ -7,9 +7,9 @@ use crate::vec3;
 use rayon::prelude::*;
 
 /// Children of a node, and faces of a leaf.
-const WIDTH: usize = 8;
+const CHILDREN: usize = 8;
 /// A lane without a face.
-const NONE: u32 = u32::MAX;
+const NO_FACE: u32 = u32::MAX;
 
 /// An axis-aligned box (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,13 +23,7 @@ impl Bounds {
 
     /// The box around `points`.
     pub fn around(points: impl IntoIterator<Item = [f64; 3]>) -> Self {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for p in points {
-            for k in 0..3 {
-                low[k] = low[k].min(p[k]);
-                high[k] = high[k].max(p[k]);
-            }
-        }
+        let (low, high) = vec3::bounds(points);
         Self { low: low.map(below), high: high.map(above) }
     }
 
@@ -63,13 +57,14 @@ fn above(x: f64) -> f32 {
 /// Eight boxes side by side.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
-struct Node {
-    low: [[f32; WIDTH]; 3],
-    high: [[f32; WIDTH]; 3],
+struct BoxNode {
+    low: [[f32; CHILDREN]; 3],
+    high: [[f32; CHILDREN]; 3],
 }
 
-impl Node {
-    const EMPTY: Self = Self { low: [[f32::INFINITY; WIDTH]; 3], high: [[f32::NEG_INFINITY; WIDTH]; 3] };
+impl BoxNode {
+    const EMPTY: Self =
+        Self { low: [[f32::INFINITY; CHILDREN]; 3], high: [[f32::NEG_INFINITY; CHILDREN]; 3] };
 
     fn set(&mut self, lane: usize, bounds: Bounds) {
         for k in 0..3 {
@@ -83,61 +78,61 @@ impl Node {
     }
 
     fn union(&self) -> Bounds {
-        (0..WIDTH).fold(Bounds::EMPTY, |all, lane| all.merged(self.get(lane)))
+        (0..CHILDREN).fold(Bounds::EMPTY, |all, lane| all.merged(self.get(lane)))
     }
 
     /// Which lanes meet `bounds`: bit `i` for lane `i`.
     #[inline(always)]
     fn meeting(&self, bounds: &Bounds) -> u32 {
-        let mut meets = [true; WIDTH];
+        let mut meets = [true; CHILDREN];
         for k in 0..3 {
             let (low, high) = (bounds.low[k], bounds.high[k]);
-            for lane in 0..WIDTH {
+            for lane in 0..CHILDREN {
                 meets[lane] &= (self.low[k][lane] <= high) & (low <= self.high[k][lane]);
             }
         }
-        (0..WIDTH).fold(0, |bits, lane| bits | u32::from(meets[lane]) << lane)
+        (0..CHILDREN).fold(0, |bits, lane| bits | u32::from(meets[lane]) << lane)
     }
 }
 
 /// Boxes of some faces of a mesh.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BoxTree {
-    /// Faces in the order of the lanes; [`NONE`] where there is none.
+    /// Faces in the order of the lanes; [`NO_FACE`] where there is none.
     order: Vec<u32>,
     /// Nodes from the leaves up: lane `i` of node `n` of a level bounds node `8n + i` of the level below.
-    levels: Vec<Vec<Node>>,
+    levels: Vec<Vec<BoxNode>>,
 }
 
 impl BoxTree {
     /// A tree of faces, given with where they are (m); its boxes are empty until it is fitted.
     pub fn new(mut faces: Vec<([f64; 3], u32)>) -> Self {
-        let leaves = faces.len().div_ceil(WIDTH);
-        let mut block = WIDTH;
-        while block * WIDTH < faces.len() {
-            block *= WIDTH;
+        let leaves = faces.len().div_ceil(CHILDREN);
+        let mut block = CHILDREN;
+        while block * CHILDREN < faces.len() {
+            block *= CHILDREN;
         }
         sort(&mut faces, block);
         let mut faces: Vec<u32> = faces.into_iter().map(|(_, f)| f).collect();
-        faces.resize(leaves * WIDTH, NONE);
-        let mut levels = vec![vec![Node::EMPTY; leaves]];
+        faces.resize(leaves * CHILDREN, NO_FACE);
+        let mut levels = vec![vec![BoxNode::EMPTY; leaves]];
         while levels[levels.len() - 1].len() > 1 {
-            let above = levels[levels.len() - 1].len().div_ceil(WIDTH);
-            levels.push(vec![Node::EMPTY; above]);
+            let above = levels[levels.len() - 1].len().div_ceil(CHILDREN);
+            levels.push(vec![BoxNode::EMPTY; above]);
         }
         Self { order: faces, levels }
     }
 
     /// Gives every face that `is_moved` the box that `bounds` says.
     pub fn fit(&mut self, bounds: impl Fn(u32) -> Bounds, is_moved: impl Fn(u32) -> bool) {
-        for (leaf, faces) in self.levels[0].iter_mut().zip(self.order.chunks(WIDTH)) {
-            for (lane, &face) in faces.iter().enumerate().filter(|(_, f)| **f != NONE && is_moved(**f)) {
+        for (leaf, faces) in self.levels[0].iter_mut().zip(self.order.chunks(CHILDREN)) {
+            for (lane, &face) in faces.iter().enumerate().filter(|(_, f)| **f != NO_FACE && is_moved(**f)) {
                 leaf.set(lane, bounds(face));
             }
         }
         for level in 1..self.levels.len() {
             let (below, above) = self.levels.split_at_mut(level);
-            for (node, children) in above[0].iter_mut().zip(below[level - 1].chunks(WIDTH)) {
+            for (node, children) in above[0].iter_mut().zip(below[level - 1].chunks(CHILDREN)) {
                 for (lane, child) in children.iter().enumerate() {
                     node.set(lane, child.union());
                 }
@@ -161,7 +156,7 @@ impl BoxTree {
                 continue;
             }
             while bits != 0 {
-                stack.push((level - 1, node * WIDTH + bits.trailing_zeros() as usize));
+                stack.push((level - 1, node * CHILDREN + bits.trailing_zeros() as usize));
                 bits &= bits - 1;
             }
         }
@@ -177,19 +172,19 @@ impl BoxTree {
         self.leaves_meeting(bounds, stack, |leaf| {
             let mut bits = self.levels[0][leaf].meeting(bounds);
             while bits != 0 {
-                found(self.order[leaf * WIDTH + bits.trailing_zeros() as usize]);
+                found(self.order[leaf * CHILDREN + bits.trailing_zeros() as usize]);
                 bits &= bits - 1;
             }
         });
     }
 
     fn leaf_faces(&self, leaf: usize) -> &[u32] {
-        &self.order[leaf * WIDTH..(leaf + 1) * WIDTH]
+        &self.order[leaf * CHILDREN..(leaf + 1) * CHILDREN]
     }
 
     /// Which leaves have a face that `is_moved`.
     fn moved_leaves(&self, is_moved: impl Fn(u32) -> bool) -> Vec<bool> {
-        self.order.chunks(WIDTH).map(|faces| faces.iter().any(|&f| f != NONE && is_moved(f))).collect()
+        self.order.chunks(CHILDREN).map(|faces| faces.iter().any(|&f| f != NO_FACE && is_moved(f))).collect()
     }
 
     /// Pairs of faces of this tree whose boxes are no farther apart than `reach` (m) along any axis, of which one
@@ -230,14 +225,15 @@ impl BoxTree {
                     if !is_asked(leaf, near) {
                         return;
                     }
-                    for (lane, &f) in self.leaf_faces(leaf).iter().enumerate().filter(|(_, f)| **f != NONE) {
+                    for (lane, &f) in self.leaf_faces(leaf).iter().enumerate().filter(|(_, f)| **f != NO_FACE)
+                    {
                         let mut bits = other.levels[0][near].meeting(&node.get(lane).widened(reach));
                         if is_same && leaf == near {
                             // Each pair of a leaf once.
                             bits &= !0 << (lane + 1);
                         }
                         while bits != 0 {
-                            let g = other.order[near * WIDTH + bits.trailing_zeros() as usize];
+                            let g = other.order[near * CHILDREN + bits.trailing_zeros() as usize];
                             bits &= bits - 1;
                             if is_moved(f) || is_same && is_moved(g) {
                                 pairs.push((f, g));
@@ -255,16 +251,12 @@ impl BoxTree {
 /// Orders `faces` so that blocks of `block`, of an eighth of it and so on lie close together.
 fn sort(faces: &mut [([f64; 3], u32)], mut block: usize) {
     while block >= faces.len() && block > 1 {
-        block /= WIDTH;
+        block /= CHILDREN;
     }
-    if faces.len() <= WIDTH || block < WIDTH {
+    if faces.len() <= CHILDREN || block < CHILDREN {
         return;
     }
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for (c, _) in &*faces {
-        low = std::array::from_fn(|k| low[k].min(c[k]));
-        high = std::array::from_fn(|k| high[k].max(c[k]));
-    }
+    let (low, high) = vec3::bounds(faces.iter().map(|(c, _)| *c));
     let extent = vec3::sub(high, low);
     let axis = (0..3).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
     let middle = (faces.len().div_ceil(block) / 2).max(1) * block;

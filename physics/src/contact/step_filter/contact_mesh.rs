@@ -100,6 +100,21 @@ fn other_end(face: [u32; 3], k: usize, v: u32) -> Option<u32> {
     }
 }
 
+/// Whether a pair of elements is a vertex and a face, and its vertices in a fixed order.
+pub(crate) type ElementKey = (bool, [u32; 4]);
+
+/// Keys of all pairs of an element of one face and one of the other.
+pub(crate) fn element_keys(one: [u32; 3], other: [u32; 3]) -> impl Iterator<Item = ElementKey> {
+    let over = [(one, other), (other, one)]
+        .into_iter()
+        .flat_map(|(a, b)| a.map(|v| ElementPair { vertices: [v, b[0], b[1], b[2]], has_face: true }));
+    let past = (0..9).map(move |k| {
+        let ([p, q], [r, s]) = (edge(one, k / 3), edge(other, k % 3));
+        ElementPair { vertices: [p, q, r, s], has_face: false }
+    });
+    over.chain(past).map(|pair| pair.key())
+}
+
 /// A vertex and a face, or two edges: what has to meet first where two triangles begin to intersect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ElementPair {
@@ -120,13 +135,14 @@ impl ElementPair {
         &self.vertices[..self.first()]
     }
 
-    fn sides(&self) -> [&[u32]; 2] {
+    /// Vertices of both elements.
+    pub fn sides(&self) -> [&[u32]; 2] {
         let (first, second) = self.vertices.split_at(self.first());
         [first, second]
     }
 
     /// The same for the same elements, however they are turned.
-    pub fn key(&self) -> (bool, [u32; 4]) {
+    pub fn key(&self) -> ElementKey {
         let mut key = self.vertices;
         let first = self.first();
         key[..first].sort_unstable();

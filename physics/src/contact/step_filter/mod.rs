@@ -18,7 +18,7 @@ mod tests;
 
 pub(crate) use box_tree::Bounds;
 use box_tree::BoxTree;
-pub(crate) use contact_mesh::{ContactMesh, ElementPair};
+pub(crate) use contact_mesh::{ContactMesh, ElementKey, ElementPair, element_keys};
 pub(crate) use separation::closest_on_edges;
 
 use crate::query::triangle_pair::{has_area, mesh_triangles_intersect};
@@ -164,23 +164,11 @@ impl<'a> StepFilter<'a> {
     }
 
     /// Elements of triangles that intersect, and may come apart.
-    fn exempt(&self, is_moved: &[bool]) -> Vec<(bool, [u32; 4])> {
-        let mut exempt = Vec::new();
-        for &(f, g) in
-            self.intersections.iter().filter(|(f, g)| is_moved[*f as usize] || is_moved[*g as usize])
-        {
-            let (one, other) = (self.mesh.faces[f as usize], self.mesh.faces[g as usize]);
-            for (a, b) in [(one, other), (other, one)] {
-                let over = a.map(|v| ElementPair { vertices: [v, b[0], b[1], b[2]], has_face: true });
-                exempt.extend(over.map(|pair| pair.key()));
-            }
-            for k in 0..3 {
-                for l in 0..3 {
-                    let vertices = [one[k], one[(k + 1) % 3], other[l], other[(l + 1) % 3]];
-                    exempt.push(ElementPair { vertices, has_face: false }.key());
-                }
-            }
-        }
+    fn exempt(&self, is_moved: &[bool]) -> Vec<ElementKey> {
+        let moves = |(f, g): &&(u32, u32)| is_moved[*f as usize] || is_moved[*g as usize];
+        let faces = &self.mesh.faces;
+        let keys = |&(f, g): &(u32, u32)| element_keys(faces[f as usize], faces[g as usize]);
+        let mut exempt: Vec<ElementKey> = self.intersections.iter().filter(moves).flat_map(keys).collect();
         exempt.sort_unstable();
         exempt.dedup();
         exempt

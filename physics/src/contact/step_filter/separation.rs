@@ -41,12 +41,12 @@ pub(crate) fn closest_on_edges([p, q]: [[f64; 3]; 2], [r, s]: [[f64; 3]; 2]) -> 
 /// How often a motion is halved where no single plane is found.
 const HALVINGS: u32 = 3;
 /// Elements nearer than this (m) have no direction from one to the other that rounding leaves right: they stay where they are.
-const TOUCHING: f64 = 1e-9;
+const TOUCHING_ELEMENTS: f64 = 1e-9;
 /// A step ends no nearer than this (m), however little room there is: ten times what rounding to f32, or to the digits of an
 /// OBJ file, moves a vertex of a person.
 pub(super) const NEAREST: f64 = 1e-6;
 /// What f64 rounds the distance between elements of a person by, some times (m).
-const ROUNDING: f64 = 1e-14;
+const DISTANCE_ROUNDING: f64 = 1e-14;
 
 /// Whether the elements of `pair` stay apart from `x` to `y`: on the way by `margin`, or half the distance they have at the start
 /// where that is less; at the end no less than [`NEAREST`] either, and where they start nearer, no nearer than they start.
@@ -56,11 +56,11 @@ pub(crate) fn stay_apart(pair: &ElementPair, x: &Corners, y: &Corners, margin: f
     }
     let gap = gap_vector(pair.has_face, x);
     let distance = norm(gap);
-    if distance < TOUCHING {
+    if distance < TOUCHING_ELEMENTS {
         return false;
     }
     let least = margin.min(0.5 * distance);
-    norm(gap_vector(pair.has_face, y)) >= NEAREST.min(distance - ROUNDING)
+    norm(gap_vector(pair.has_face, y)) >= NEAREST.min(distance - DISTANCE_ROUNDING)
         && is_separated(pair, scale(gap, 1.0 / distance), x, y, least, HALVINGS)
 }
 
@@ -158,7 +158,7 @@ fn between_middles([a, b]: &TrianglePair) -> Option<[f64; 3]> {
     let middle = |t: &[[f64; 3]; 3]| std::array::from_fn(|k| t[0][k] + t[1][k] + t[2][k]);
     let between: [f64; 3] = sub(middle(a), middle(b));
     let length = norm(between);
-    (length > TOUCHING).then(|| scale(between, 1.0 / length))
+    (length > TOUCHING_ELEMENTS).then(|| scale(between, 1.0 / length))
 }
 
 fn unit_normal([a, b, c]: &[[f64; 3]; 3]) -> Option<[f64; 3]> {

@@ -17,10 +17,10 @@
 
 use rayon::prelude::*;
 
-use super::OuterPoints;
+use super::outer_points::OuterPoints;
 use crate::energy::curvature::outer as dyad;
 use crate::energy::elements::GRAIN;
-use crate::energy::{CurvatureSink, EnergySettings, LayerGate, Weighted};
+use crate::energy::{CurvatureSink, EnergySettings, Weighted};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::{ClosestPoint, Feature, SurfacePoint};
 use crate::real::Real;
@@ -34,7 +34,7 @@ pub(super) struct InnerCloth {
 }
 
 /// One outer point against the point of the inner surface that is closest to it.
-struct Contact {
+struct SurfaceContact {
     outer: usize,
     corners: [u32; 3],
     barycentric: [f64; 3],
@@ -112,46 +112,34 @@ impl InnerCloth {
         closest: &ClosestPoint,
         outer: &OuterPoints<'_, T>,
         settings: &EnergySettings,
-    ) -> Vec<Contact> {
+    ) -> Vec<SurfaceContact> {
         let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate.unwrap_or_default());
-        let of = |(outer, p): (usize, &[T; 3])| {
+        let contact = |(outer, p): (usize, &[T; 3])| {
             let p = to_f64(*p);
             let found = closest.project_within(p, gate.depth.max(epsilon))?;
-            self.contact(closest, outer, p, &found, epsilon, gate)
+            let (distance, direction) = found.signed(p, found.is_behind(p));
+            let penalty = penalty(distance, epsilon, gate.depth);
+            if penalty[0] == 0.0 {
+                return None;
+            }
+            let corners = closest.face(found.face);
+            let values = corners.map(|v| self.inside[v as usize]);
+            let [share, slope] = smooth_step(dot(values, found.barycentric));
+            if share == 0.0 {
+                return None;
+            }
+            let gradients = interpolated_gradients(values, closest.corners(found.face), &found, p);
+            Some(SurfaceContact {
+                outer,
+                corners,
+                barycentric: found.barycentric,
+                direction,
+                share,
+                share_gradients: gradients.map(|gradient| scale(gradient, slope)),
+                penalty,
+            })
         };
-        outer.at.par_iter().with_min_len(GRAIN / 2).enumerate().filter_map(of).collect()
-    }
-
-    fn contact(
-        &self,
-        closest: &ClosestPoint,
-        outer: usize,
-        p: [f64; 3],
-        found: &SurfacePoint,
-        epsilon: f64,
-        gate: LayerGate,
-    ) -> Option<Contact> {
-        let (distance, direction) = found.signed(p, found.is_behind(p));
-        let penalty = penalty(distance, epsilon, gate.depth);
-        if penalty[0] == 0.0 {
-            return None;
-        }
-        let corners = closest.face(found.face);
-        let values = corners.map(|v| self.inside[v as usize]);
-        let [share, slope] = smooth_step(dot(values, found.barycentric));
-        if share == 0.0 {
-            return None;
-        }
-        let gradients = interpolated_gradients(values, closest.corners(found.face), found, p);
-        Some(Contact {
-            outer,
-            corners,
-            barycentric: found.barycentric,
-            direction,
-            share,
-            share_gradients: gradients.map(|gradient| scale(gradient, slope)),
-            penalty,
-        })
+        outer.at.par_iter().with_min_len(GRAIN / 2).enumerate().filter_map(contact).collect()
     }
 }
 

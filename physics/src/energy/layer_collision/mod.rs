@@ -7,37 +7,22 @@
 
 pub mod closest_point;
 pub mod nearest_vertex;
+mod outer_points;
 
-use super::{ContactPoints, ContactSamples, CurvatureSink, EnergySettings, LayerContact, Weighted};
+use super::{CurvatureSink, EnergySettings, LayerContact, Weighted};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::ClosestPoint;
 use crate::real::Real;
 use crate::vec3::to_f64;
 use closest_point::InnerCloth;
 use nearest_vertex::{InnerVertices, PosedVertices};
+pub use outer_points::OuterPoints;
 
 /// What stays the same of a garment that others lie on.
 #[derive(Debug, Clone)]
 pub struct InnerLayer {
     vertices: InnerVertices,
     cloth: InnerCloth,
-}
-
-/// The contact points of an outer garment in its present position.
-#[derive(Debug)]
-pub struct OuterPoints<'a, T> {
-    points: &'a ContactPoints,
-    /// `[P, 3]` (m).
-    at: Vec<[T; 3]>,
-    /// What of a vertex each of them stands for.
-    share: f64,
-}
-
-impl<'a, T: Real> OuterPoints<'a, T> {
-    /// Of the garment of `points` at `posed` `[V, 3]` (m).
-    pub fn new(points: &'a ContactPoints, posed: &[[T; 3]], samples: ContactSamples) -> Self {
-        Self { points, at: points.at(posed, samples), share: points.share(samples) }
-    }
 }
 
 /// An inner garment in its present position: made once per evaluation, used by every pair that it is the inner one of.
@@ -50,14 +35,13 @@ pub enum PosedInnerLayer<T: Real> {
 }
 
 impl InnerLayer {
-    pub(super) fn new(rest: &TriMesh, topology: &Topology, median_edge: f64) -> Self {
-        let vertices = InnerVertices::with_median_edge(rest, median_edge);
-        Self { vertices, cloth: InnerCloth::new(rest, topology) }
+    pub(super) fn new(rest: &TriMesh, topology: &Topology) -> Self {
+        Self { vertices: InnerVertices::new(rest), cloth: InnerCloth::new(rest, topology) }
     }
 
     /// Median edge of the rest shape (m).
     pub(crate) fn median_edge(&self) -> f64 {
-        self.vertices.median_edge()
+        self.vertices.median_edge
     }
 
     /// Prepares the garment at `positions` `[V, 3]` (m) for queries.
@@ -66,7 +50,7 @@ impl InnerLayer {
             LayerContact::NearestVertex => PosedInnerLayer::Vertices(self.vertices.posed(positions)),
             LayerContact::ClosestPoint => {
                 let positions = positions.iter().map(|p| to_f64(*p)).collect();
-                PosedInnerLayer::Cloth(ClosestPoint::new(positions, self.vertices.faces()))
+                PosedInnerLayer::Cloth(ClosestPoint::new(positions, &self.vertices.faces))
             }
         }
     }

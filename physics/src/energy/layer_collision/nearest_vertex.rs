@@ -14,9 +14,9 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::OuterPoints;
+use super::outer_points::OuterPoints;
 use crate::energy::elements::GRAIN;
-use crate::energy::{EnergySettings, LayerGate, Weighted};
+use crate::energy::{EnergySettings, Weighted};
 use crate::mesh::TriMesh;
 use crate::query::VertexIndex;
 use crate::real::Real;
@@ -24,19 +24,20 @@ use crate::rows::{CompressedRows, corners_at_vertices};
 use crate::vec3::{accumulate, add, axpy, cross, dot, norm, norm_squared, scale, sub, to_f64, zero};
 
 /// τ in units of `|N|` at rest.
-pub const COLLAPSE_RATIO: f64 = 1e-4;
+pub const NORMAL_COLLAPSE_RATIO: f64 = 1e-4;
 
 /// Smallest τ in units of the squared median edge.
-pub const COLLAPSE_FLOOR: f64 = 1e-6;
+pub const NORMAL_COLLAPSE_FLOOR: f64 = 1e-6;
 
 /// What stays the same of an inner garment.
 #[derive(Debug, Clone)]
 pub struct InnerVertices {
-    faces: Arc<[[u32; 3]]>,
+    pub(super) faces: Arc<[[u32; 3]]>,
     corners_at: CompressedRows<u32>,
     /// τ² per vertex (m⁴).
     collapse_squared: Vec<f64>,
-    median_edge: f64,
+    /// Of the rest shape (m).
+    pub(super) median_edge: f64,
 }
 
 /// Posed normals and index of an inner garment.
@@ -49,34 +50,26 @@ pub struct PosedVertices<T: Real> {
 
 /// One outer point against its inner vertex.
 #[derive(Debug, Clone, Copy)]
-struct Contact {
+struct VertexContact {
     inner: u32,
     energy: f64,
     /// `∂E/∂d`.
     slope: f64,
 }
 
-const NO_CONTACT: Contact = Contact { inner: 0, energy: 0.0, slope: 0.0 };
+const NO_CONTACT: VertexContact = VertexContact { inner: 0, energy: 0.0, slope: 0.0 };
 
 impl InnerVertices {
-    pub(super) fn with_median_edge(rest: &TriMesh, median_edge: f64) -> Self {
+    pub(super) fn new(rest: &TriMesh) -> Self {
+        let median_edge = rest.median_edge_length();
         let faces: Arc<[[u32; 3]]> = rest.faces().into();
         let corners_at = corners_at_vertices(rest.vertex_count(), &faces);
-        let floor = COLLAPSE_FLOOR * median_edge * median_edge;
+        let floor = NORMAL_COLLAPSE_FLOOR * median_edge * median_edge;
         let collapse_squared = area_normals(rest.positions(), &faces, &corners_at)
             .into_iter()
-            .map(|n| (COLLAPSE_RATIO * norm(n)).max(floor).powi(2))
+            .map(|n| (NORMAL_COLLAPSE_RATIO * norm(n)).max(floor).powi(2))
             .collect();
         Self { faces, corners_at, collapse_squared, median_edge }
-    }
-
-    /// Median edge of the rest shape (m).
-    pub(super) fn median_edge(&self) -> f64 {
-        self.median_edge
-    }
-
-    pub(super) fn faces(&self) -> &Arc<[[u32; 3]]> {
-        &self.faces
     }
 
     pub(super) fn posed<T: Real>(&self, positions: &[[T; 3]]) -> PosedVertices<T> {
@@ -107,12 +100,26 @@ impl InnerVertices {
         targets: Option<[Weighted<'_, T>; 2]>,
     ) -> f64 {
         let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate);
-        let contacts: Vec<Contact> = outer
-            .at
-            .par_iter()
-            .with_min_len(GRAIN / 2)
-            .map(|&p| self.contact(inner, posed, p, epsilon, gate).unwrap_or(NO_CONTACT))
-            .collect();
+        let contact = |p: &[T; 3]| {
+            let (v, _) = posed.index.nearest(*p);
+            let offset = sub(to_f64(*p), to_f64(*inner.get(v as usize)?));
+            let (normal, _) = self.normal(posed, v as usize)?;
+            let gap = dot(offset, normal);
+            if let Some(gate) = gate {
+                let aside = gate.tangential_edges * self.median_edge;
+                let tangential = crate::vec3::add_scaled(offset, -gap, normal);
+                if gap.abs() > gate.depth || norm_squared(tangential) > aside * aside {
+                    return None;
+                }
+            }
+            let excess = epsilon - gap;
+            if excess <= 0.0 {
+                return None;
+            }
+            Some(VertexContact { inner: v, energy: excess.powi(3), slope: -3.0 * excess * excess })
+        };
+        let points = outer.at.par_iter().with_min_len(GRAIN / 2);
+        let contacts: Vec<VertexContact> = points.map(|p| contact(p).unwrap_or(NO_CONTACT)).collect();
         if let Some([mut inner_target, mut outer_target]) = targets {
             // With f = x − x_g: ∂d/∂x = n, ∂d/∂x_g = −n, ∂d/∂N = (f − n (n·f))/√(|N|² + τ²).
             let mut by_normal = vec![zero(); inner.len()];
@@ -134,33 +141,6 @@ impl InnerVertices {
             self.pull_back_normals(inner, &by_normal, inner_target);
         }
         contacts.iter().map(|c| c.energy).sum()
-    }
-
-    #[inline(always)]
-    fn contact<T: Real>(
-        &self,
-        inner: &[[T; 3]],
-        posed: &PosedVertices<T>,
-        p: [T; 3],
-        epsilon: f64,
-        gate: Option<LayerGate>,
-    ) -> Option<Contact> {
-        let (v, _) = posed.index.nearest(p);
-        let offset = sub(to_f64(p), to_f64(*inner.get(v as usize)?));
-        let (normal, _) = self.normal(posed, v as usize)?;
-        let gap = dot(offset, normal);
-        if let Some(gate) = gate {
-            let aside = gate.tangential_edges * self.median_edge;
-            let tangential = crate::vec3::add_scaled(offset, -gap, normal);
-            if gap.abs() > gate.depth || norm_squared(tangential) > aside * aside {
-                return None;
-            }
-        }
-        let excess = epsilon - gap;
-        if excess <= 0.0 {
-            return None;
-        }
-        Some(Contact { inner: v, energy: excess.powi(3), slope: -3.0 * excess * excess })
     }
 
     /// Adds the gradient through `N` to the corners of the faces: a face with corners `a b c` adds `a×b + b×c + c×a` to `N`

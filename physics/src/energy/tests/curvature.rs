@@ -29,7 +29,7 @@ impl CurvatureSink for Product<'_> {
 /// Curvature times `x`, taken as a displacement of posed and of canonical positions alike.
 fn product(scene: &Scene<f64>, posed: &[[f64; 3]], x: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let mut product = Product { x, result: vec![[0.0; 3]; x.len()] };
-    scene.energy.curvature(posed, &scene.canonical, &mut product);
+    scene.energy.curvature(posed, &scene.canonical, &mut product, None);
     product.result
 }
 

@@ -67,9 +67,9 @@ fn so_it_is_with_every_switch() {
     check(Term::Holding, EnergySettings { holding_fraction: 0.4, ..default }, 3, "40 % held");
 }
 
-/// What is worn below makes the body thicker, by another amount at every vertex.
+/// Garments below make the body thicker, by another amount at every vertex.
 #[test]
-fn cloth_over_what_is_worn_below_keeps_a_margin_that_has_grown() {
+fn cloth_over_other_garments_keeps_a_margin_that_has_grown() {
     for samples in [ContactSamples::Vertices, ContactSamples::FacesAndEdges] {
         let settings = EnergySettings { body_samples: samples, ..EnergySettings::default() };
         let over = |term: Term, thickness: &dyn Fn(usize) -> f64| {
@@ -81,7 +81,7 @@ fn cloth_over_what_is_worn_below_keeps_a_margin_that_has_grown() {
         };
         let value = |scene: &Scene<f64>| scene.energy.evaluate(&scene.posed, &scene.canonical).total;
         let uneven = |v: usize| 1e-3 * (v % 5) as f64;
-        check_scene(over(Term::BodyCollision, &uneven), Term::BodyCollision, 3, "worn below");
+        check_scene(over(Term::BodyCollision, &uneven), Term::BodyCollision, 3, "garments below");
         // The same thickness everywhere is a larger margin.
         let margin = settings.body_collision_epsilon + 3e-3;
         let wider = EnergySettings { body_collision_epsilon: margin, ..settings };

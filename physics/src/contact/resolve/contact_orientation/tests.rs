@@ -14,19 +14,19 @@ fn sheets(gap: f64) -> [TriMesh; 2] {
 }
 
 /// Calls `with` the outfit of meshes, and their positions one behind the other.
-fn dressed<R>(meshes: &[TriMesh], with: impl FnOnce(&Outfit<'_>, Vec<[f64; 3]>) -> R) -> R {
+fn dressed<R>(meshes: &[TriMesh], with: impl FnOnce(&PackedCloth<'_>, Vec<[f64; 3]>) -> R) -> R {
     let garments: Vec<RestGarment> = meshes.iter().map(RestGarment::new).collect();
     let layers = layers(&garments, meshes.iter().map(TriMesh::positions));
-    with(&Outfit::new(&layers), meshes.iter().flat_map(TriMesh::positions).copied().collect())
+    with(&PackedCloth::new(&layers), meshes.iter().flat_map(TriMesh::positions).copied().collect())
 }
 
-fn intersections(outfit: &Outfit<'_>, positions: &[[f64; 3]]) -> usize {
+fn intersections(outfit: &PackedCloth<'_>, positions: &[[f64; 3]]) -> usize {
     let [lower, upper] = [0, 1].map(|g| (outfit.part(positions, g), outfit.layers[g].garment.faces()));
     triangle_pairs(lower.0, lower.1, upper.0, upper.1).len()
 }
 
 /// Enforces contacts until all are met.
-fn enforced(contacts: &[Contact], positions: &mut [[f64; 3]], may_move: &[bool]) {
+fn enforced(contacts: &[Condition], positions: &mut [[f64; 3]], may_move: &[bool]) {
     for _ in 0..2000 {
         let mut is_violated = false;
         for contact in contacts {
@@ -71,9 +71,9 @@ fn sheets_that_were_pushed_through_each_other_come_back_to_the_side_they_were_on
 
 #[test]
 fn nothing_is_asked_of_what_is_far_or_held() {
-    dressed(&sheets(2.0 * WATCH), |outfit, before| {
+    dressed(&sheets(2.0 * ORIENTED_WITHIN), |outfit, before| {
         let orientation = ContactOrientation::of(outfit, &before, None);
-        assert!(orientation.vertices.is_empty() && orientation.edges.is_empty());
+        assert!(orientation.pairs.is_empty());
     });
     dressed(&sheets(4e-4), |outfit, before| {
         let orientation = ContactOrientation::of(outfit, &before, None);
@@ -102,23 +102,20 @@ fn faces_that_intersect_have_no_sides() {
         let orientation = ContactOrientation::of(outfit, &before, None);
         let intersected = TriangleTree::new(&before, &outfit.faces).self_pairs();
         assert!(intersected.len() > 10);
+        let known: HashSet<ElementKey> = orientation.pairs.iter().map(|of| of.pair.key()).collect();
         for (f, g) in intersected {
             assert!(orientation.is_unknown(f, g) && orientation.is_unknown(g, f));
-            let (f, g) = (outfit.faces[f as usize], outfit.faces[g as usize]);
-            assert!(!orientation.vertices.iter().any(|s| s.face == g && f.contains(&s.vertex)));
-            let is_of = |edge: &[u32; 2], face: [u32; 3]| edges_of(face).contains(edge);
-            assert!(!orientation.edges.iter().any(|s| is_of(&s.edges[0], f) && is_of(&s.edges[1], g)));
+            let mut keys = element_keys(outfit.faces[f as usize], outfit.faces[g as usize]);
+            assert!(!keys.any(|key| known.contains(&key)));
         }
         // Away from where they cross, every vertex near the other sheet knows its side.
-        assert!(
-            orientation.vertices.iter().any(|s| s.side > 0.0)
-                && orientation.vertices.iter().any(|s| s.side < 0.0)
-        );
-        let heights =
-            orientation.vertices.iter().filter(|s| s.vertex as usize >= outfit.part(&before, 0).len());
-        for s in heights.filter(|s| s.gap > 1e-9) {
-            let is_over = before[s.vertex as usize][0] > 0.05;
-            let looks_up = before[s.face[0] as usize][2] == 0.0;
+        let over_faces: Vec<&OrientedPair> = over_faces(&orientation).collect();
+        assert!(over_faces.iter().any(|s| s.side > 0.0) && over_faces.iter().any(|s| s.side < 0.0));
+        let is_upper = |s: &&&OrientedPair| s.pair.vertices[0] as usize >= outfit.part(&before, 0).len();
+        for s in over_faces.iter().filter(is_upper).filter(|s| s.gap > 1e-9) {
+            let [vertex, corner, ..] = s.pair.vertices;
+            let is_over = before[vertex as usize][0] > 0.05;
+            let looks_up = before[corner as usize][2] == 0.0;
             assert!(!looks_up || (s.side > 0.0) == is_over);
         }
     });
@@ -145,9 +142,11 @@ fn what_intersects_keeps_the_side_it_had_before() {
         let known = ContactOrientation::of(outfit, &through, Some(&known));
         assert!(known.not_oriented.is_empty() && unknown.not_oriented.len() == 2 * intersected);
         let over = |orientation: &ContactOrientation| {
-            let is_up =
-                |of: &&VertexOverFace| of.vertex as usize >= upper && before[of.face[0] as usize][2] == 0.0;
-            orientation.vertices.iter().filter(is_up).filter(|of| of.side > 0.0).count()
+            let is_up = |of: &&OrientedPair| {
+                let [vertex, corner, ..] = of.pair.vertices;
+                vertex as usize >= upper && before[corner as usize][2] == 0.0
+            };
+            over_faces(orientation).filter(is_up).filter(|of| of.side > 0.0).count()
         };
         assert!(over(&known) > over(&unknown));
         let mut positions = through.clone();
@@ -160,6 +159,11 @@ fn what_intersects_keeps_the_side_it_had_before() {
     });
 }
 
+/// The pairs of a vertex and a face.
+fn over_faces(orientation: &ContactOrientation) -> impl Iterator<Item = &OrientedPair> {
+    orientation.pairs.iter().filter(|of| of.pair.has_face)
+}
+
 /// The edges of all garments, numbered through, and those of every face.
 #[test]
 fn faces_know_their_edges() {
@@ -168,7 +172,9 @@ fn faces_know_their_edges() {
         let distinct: HashSet<[u32; 2]> = edges.all.iter().copied().collect();
         assert_eq!(distinct.len(), edges.all.len());
         for (face, of_face) in outfit.faces.iter().zip(&edges.of_face) {
-            assert_eq!(edges_of(*face), of_face.map(|e| edges.all[e as usize]));
+            let [a, b, c] = *face;
+            let expected = [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)]);
+            assert_eq!(expected, of_face.map(|e| edges.all[e as usize]));
         }
     });
 }

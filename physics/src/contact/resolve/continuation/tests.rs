@@ -41,22 +41,16 @@ fn a_rising_knee_takes_the_sheet_along() {
     let sample = end(&sample_at);
     let layers = [Layer { garment: &garment, positions: &sample.draped[0] }];
     let settings = ResolveSettings::default();
-    let follow = |end: &Body<'_>| {
-        let step_lengths = StepLengths::FROM_T_POSE;
-        let path = Path {
-            layers: &layers,
-            end,
-            settings: &settings,
-            budget: &Budget::new(&settings, 1),
-            step_lengths,
-        };
-        let first = sample_at(0.0).unwrap();
-        let positions = first.draped.clone();
-        let (followed, steps) = path.continue_from(untouched(first, positions), &sample_at).unwrap();
-        assert!(steps >= 8, "{steps}");
-        followed.unwrap()
-    };
-    let followed = with_drawn(&sample.body, &layers, |drawn| with_body(drawn, 1, follow));
+    let task = Task { layers: &layers, settings: &settings, budget: &Budget::new(&settings, 1) };
+    let drawn = BodyObstacle::near_layers(&sample.body, &layers);
+    let yielded = YieldedBody::ample(&drawn, 1);
+    let end = &SoftBody::new(drawn, 1, yielded.as_ref());
+    let path = Path { task, end, step_lengths: StepLengths::FROM_T_POSE };
+    let first = sample_at(0.0).unwrap();
+    let positions = first.draped.clone();
+    let (followed, steps) = path.continue_from(untouched(first, positions), &sample_at).unwrap();
+    assert!(steps >= 8, "{steps}");
+    let followed = followed.unwrap();
     is_over_the_knee(&followed.positions[0], &sheet, &sample.body);
 }
 

@@ -2,7 +2,6 @@
 
 use super::FastPass;
 use crate::contact::resolve::certificate::Certificate;
-use crate::contact::resolve::contact::Plane;
 use crate::contact::resolve::count::{certified_around, counted, is_near};
 use crate::contact::resolve::garment::at;
 use crate::contact::{ReportBody, Triangle, TriangleTree};
@@ -31,7 +30,7 @@ impl ReportBody for FastPass<'_> {
     fn distances(&self, garment: usize, _: &[[f64; 3]]) -> Vec<Option<(f64, [f64; 3])>> {
         let vertices = self.outfit.vertices(garment);
         let planes = &self.planes[vertices.start as usize..vertices.end as usize];
-        planes.iter().map(|plane| plane.as_ref().map(Plane::seen)).collect()
+        planes.iter().map(|plane| plane.map(|plane| (plane.distance, plane.normal))).collect()
     }
 
     fn known_pairs(&self, garment: usize, with: Option<usize>) -> Option<Vec<(u32, u32)>> {
@@ -40,14 +39,12 @@ impl ReportBody for FastPass<'_> {
         // The inner garment comes first in the pairs of the filter, the body last.
         let is_self_pair = with == Some(garment);
         let local = |&(f, g): &(u32, u32)| match with {
-            None => (of(f) == Some(garment))
-                .then_some(())
-                .and_then(|()| Some((f - first(garment), self.body_face(g)?))),
+            None if of(f) == Some(garment) => Some((f - first(garment), self.body_face(g)?)),
             Some(inner) if of(f) == Some(inner) && of(g) == Some(garment) => {
                 let (f, g) = (f - first(inner), g - first(garment));
                 Some(if is_self_pair { (f, g) } else { (g, f) })
             }
-            Some(_) => None,
+            _ => None,
         };
         let mut pairs: Vec<(u32, u32)> = self.filter.intersections.iter().filter_map(local).collect();
         pairs.sort_unstable();

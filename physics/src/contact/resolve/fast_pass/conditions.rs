@@ -1,22 +1,22 @@
 //! Where an outfit intersects, and the conditions there.
 
 use super::FastPass;
-use crate::contact::resolve::contact::{Contact, Plane, along_line, is_tiny, normal_of};
+use crate::contact::resolve::condition::{Condition, Plane, along_line, is_tiny, normal_of};
 use crate::contact::resolve::layer_constraint::{
-    LayerConstraint, Order, OutermostSheet, STEEP, order, part_along, part_from_body,
+    LayerConstraint, OutermostSheet, STEEP, order, part_along, part_from_body, sum_over,
 };
 use crate::contact::step_filter::{Bounds, ElementPair, closest_on_edges};
-use crate::vec3::{add, add_scaled, cross, dot, normalized, scale, sub};
+use crate::vec3::{add_scaled, cross, dot, normalized, scale, sub};
 use rayon::prelude::*;
 
 /// Elements nearer than this are kept apart (m).
-const NEAR: f64 = 0.003;
+const NEAR_ELEMENTS: f64 = 0.003;
 /// Deeper in each other than this (m), elements of garments are ordered by the sheets around them, not by their own planes.
-const DEEP: f64 = 0.012;
+const DEEPEST_BY_PLANES: f64 = 0.012;
 /// How far under an inner garment an outer one is still brought over it (m): half a thin limb.
-const REACH: f64 = 0.025;
+const DEEPEST_UNDER: f64 = 0.025;
 /// Contacts between elements whose directions differ more than this (cosine) are left to others near them.
-const ALONG: f64 = 0.6;
+const LEAST_ALONG: f64 = 0.6;
 
 /// The part of an outfit that may move.
 #[derive(Default)]
@@ -71,23 +71,20 @@ impl FastPass<'_> {
     /// What the body leaves to vertex `v`, and which sheets of inner garments it has to stay over.
     fn look(&self, v: u32) -> (Option<Plane>, Vec<LayerConstraint>) {
         let (p, away) = (self.positions[v as usize], self.outward[v as usize]);
-        let plane = self.planes[v as usize].filter(|plane| plane.distance < NEAR);
-        // More than half way through a limb the nearest way out is its other side: cloth goes back to its own.
-        let is_through = plane.is_some_and(|plane| plane.distance < 0.0 && dot(plane.normal, away) < 0.0);
-        let back = if is_through { self.body.exit(p, away, self.settings.farthest) } else { None };
-        (back.or(plane), self.sheets_over(v))
+        let plane = self.planes[v as usize].filter(|plane| plane.distance < NEAR_ELEMENTS);
+        (self.body.back_from_through(plane, p, away, self.settings.farthest), self.sheets_over(v))
     }
 
-    /// Of every inner garment the outermost sheet that lies less than [`REACH`] over vertex `v`.
+    /// Of every inner garment the outermost sheet that lies less than [`DEEPEST_UNDER`] over vertex `v`.
     fn sheets_over(&self, v: u32) -> Vec<LayerConstraint> {
         let (p, away, garment) =
             (self.positions[v as usize], self.outward[v as usize], self.outfit.garment_of(v));
         if away == [0.0; 3] || garment == 0 {
             return Vec::new();
         }
-        let outermost = |_| OutermostSheet { from: p, away, heights: 0.0..=REACH, found: None };
+        let outermost = |_| OutermostSheet { from: p, away, heights: 0.0..=DEEPEST_UNDER, found: None };
         let mut outermost: Vec<OutermostSheet> = (0..garment).map(outermost).collect();
-        self.filter.cloth_faces_meeting(&Bounds::around([p, add_scaled(p, REACH, away)]), |f| {
+        self.filter.cloth_faces_meeting(&Bounds::around([p, add_scaled(p, DEEPEST_UNDER, away)]), |f| {
             if let Some(outermost) = outermost.get_mut(self.outfit.garment_of_face(f)) {
                 outermost.offer(f, self.outfit.faces[f as usize], &self.positions, &self.outward);
             }
@@ -95,19 +92,14 @@ impl FastPass<'_> {
         outermost.into_iter().filter_map(|sheet| sheet.over(v, self.outfit, &self.positions)).collect()
     }
 
-    /// The direction away from the body of a face of a garment, not normalised.
-    fn direction(&self, f: u32) -> [f64; 3] {
-        self.outfit.faces[f as usize].iter().fold([0.0; 3], |sum, &v| add(sum, self.outward[v as usize]))
-    }
-
     /// What has to hold in the region of `defects` and next to it.
-    pub(super) fn conditions(&mut self, defects: &DefectRegion) -> Vec<Contact> {
+    pub(super) fn conditions(&mut self, defects: &DefectRegion) -> Vec<Condition> {
         let is_in = &defects.is_in;
         let mesh = self.filter.mesh;
         let is_near = |f: u32| !mesh.is_body(f) && mesh.faces[f as usize].iter().any(|&v| is_in[v as usize]);
-        let candidates = self.filter.candidates(&is_near, NEAR);
+        let candidates = self.filter.candidates(&is_near, NEAR_ELEMENTS);
         let this = &*self;
-        let mut contacts: Vec<Contact> = candidates
+        let mut contacts: Vec<Condition> = candidates
             .par_chunks(256)
             .flat_map_iter(|chunk| {
                 let mut found = Vec::new();
@@ -123,8 +115,8 @@ impl FastPass<'_> {
                 continue;
             }
             let (outer, inner) = (mesh.faces[f.max(g) as usize], mesh.faces[f.min(g) as usize]);
-            if let Order::Along(away) = order(outer, inner, true, &self.outward) {
-                part_along(away, outer, inner, &self.positions, 0.5 * gap, REACH, &mut parting);
+            if let Some(away) = order(outer, inner, true, &self.outward) {
+                part_along(away, outer, inner, &self.positions, 0.5 * gap, DEEPEST_UNDER, &mut parting);
             }
         }
         self.remembered.extend(parting);
@@ -134,17 +126,17 @@ impl FastPass<'_> {
         for (v, plane) in &defects.planes {
             let wanted =
                 if plane.is_held { plane.distance.clamp(0.0, gap) } else { self.wanted(plane.distance) };
-            contacts.push(Contact::vertex(*v, plane, wanted));
+            contacts.push(Condition::vertex(*v, plane, wanted));
         }
         contacts
     }
 
     /// The part of a face that lies over a face of the body has to come out of it.
-    fn part_from_body(&self, f: u32, g: u32, found: &mut Vec<Contact>) {
+    fn part_from_body(&self, f: u32, g: u32, found: &mut Vec<Condition>) {
         let ground = self.corners(g);
         if !is_tiny(&ground) && !self.is_other_side(f, normal_of(&ground)) {
             let face = self.outfit.faces[f as usize];
-            part_from_body(face, &self.positions, &ground, (0.5 * self.settings.gap, REACH), found);
+            part_from_body(face, &self.positions, &ground, (0.5 * self.settings.gap, DEEPEST_UNDER), found);
         }
     }
 
@@ -154,18 +146,19 @@ impl FastPass<'_> {
             let plane = &self.planes[v as usize];
             plane.as_ref().is_some_and(|plane| plane.distance > 0.0 && dot(plane.normal, normal) > 0.0)
         };
-        dot(normal, self.direction(f)) < 0.0 && !self.outfit.faces[f as usize].iter().any(seen)
+        let face = self.outfit.faces[f as usize];
+        dot(normal, sum_over(face, &self.outward)) < 0.0 && !face.iter().any(seen)
     }
 
     /// How far apart what is `height` apart (m) has to get: what is too near gets the gap, the rest only keeps from
     /// coming too near.
     fn wanted(&self, height: f64) -> f64 {
-        let least = self.settings.trigger * self.settings.gap;
+        let least = self.settings.least_gap();
         if height < least { self.settings.gap } else { least }
     }
 
     /// Conditions on the elements of faces `f` and `g`, if it is known which of them lies over the other.
-    fn keep_apart(&self, f: u32, g: u32, found: &mut Vec<Contact>) {
+    fn keep_apart(&self, f: u32, g: u32, found: &mut Vec<Condition>) {
         let mesh = self.filter.mesh;
         // Along which direction the second lies under the first.
         let (over, away) = match self.body_face(g) {
@@ -184,10 +177,10 @@ impl FastPass<'_> {
                     return;
                 }
                 match order(mesh.faces[over as usize], mesh.faces[under as usize], is_outer, &self.outward) {
-                    Order::Along(away) => (over, Some(away)),
+                    Some(away) => (over, Some(away)),
                     // Sheets of one garment stay on the side of each other that they are on.
-                    Order::Unknown if !is_outer && !self.intersect(f, g) => (over, None),
-                    Order::Unknown => return,
+                    None if !is_outer && !self.intersect(f, g) => (over, None),
+                    None => return,
                 }
             }
         };
@@ -221,7 +214,7 @@ impl FastPass<'_> {
     }
 
     /// The vertex of `pair` over its face along `away`, or under it.
-    fn over_face(&self, pair: &ElementPair, is_over: bool, away: Option<[f64; 3]>) -> Option<Contact> {
+    fn over_face(&self, pair: &ElementPair, is_over: bool, away: Option<[f64; 3]>) -> Option<Condition> {
         let [p, a, b, c] = pair.vertices.map(|v| self.positions[v as usize]);
         if is_tiny(&[a, b, c]) {
             return None;
@@ -230,22 +223,16 @@ impl FastPass<'_> {
         let height = dot(normal, sub(p, a));
         let side = self.side(normal, (is_over, away), height, STEEP)?;
         let (up, height) = (scale(normal, side), side * height);
-        if !(-self.deepest(pair)..NEAR).contains(&height) {
+        if !(-self.deepest(pair)..NEAR_ELEMENTS).contains(&height) {
             return None;
         }
         let (_, at) = along_line(p, normal, &[a, b, c])?;
-        let [v, rest @ ..] = pair.vertices;
-        self.contact(
-            [v, rest[0], rest[1], rest[2]],
-            [1.0, -at[0], -at[1], -at[2]],
-            up,
-            height,
-            away.is_none(),
-        )
+        let weights = [1.0, -at[0], -at[1], -at[2]];
+        self.contact(pair.vertices, weights, (up, height), away.is_none())
     }
 
     /// The first edge of `pair` over its second along `away`, or under it.
-    fn over_edge(&self, pair: &ElementPair, is_over: bool, away: Option<[f64; 3]>) -> Option<Contact> {
+    fn over_edge(&self, pair: &ElementPair, is_over: bool, away: Option<[f64; 3]>) -> Option<Condition> {
         let [p, q, r, s] = pair.vertices.map(|v| self.positions[v as usize]);
         let [t, u] = closest_on_edges([p, q], [r, s]);
         let is_inner = |t: f64| t > 0.0 && t < 1.0;
@@ -255,11 +242,11 @@ impl FastPass<'_> {
         }
         let weights = [1.0 - t, t, u - 1.0, -u];
         let height = (0..4).map(|k| weights[k] * dot(normal, [p, q, r, s][k])).sum::<f64>();
-        let side = self.side(normal, (is_over, away), height, ALONG)?;
+        let side = self.side(normal, (is_over, away), height, LEAST_ALONG)?;
         let (up, height) = (scale(normal, side), side * height);
-        (-self.deepest(pair)..NEAR)
+        (-self.deepest(pair)..NEAR_ELEMENTS)
             .contains(&height)
-            .then(|| self.contact(pair.vertices, weights, up, height, away.is_none()))
+            .then(|| self.contact(pair.vertices, weights, (up, height), away.is_none()))
             .flatten()
     }
 
@@ -267,7 +254,7 @@ impl FastPass<'_> {
     /// are.
     fn deepest(&self, pair: &ElementPair) -> f64 {
         let is_body = |v: &u32| *v as usize >= self.input.len();
-        if pair.vertices.iter().any(is_body) { self.settings.gap } else { DEEP }
+        if pair.vertices.iter().any(is_body) { self.settings.gap } else { DEEPEST_BY_PLANES }
     }
 
     /// A condition on four vertices, of which those of the body are where they are.
@@ -275,21 +262,16 @@ impl FastPass<'_> {
         &self,
         vertices: [u32; 4],
         weights: [f64; 4],
-        normal: [f64; 3],
-        height: f64,
+        (normal, height): ([f64; 3], f64),
         keeps: bool,
-    ) -> Option<Contact> {
+    ) -> Option<Condition> {
         let cloth = self.input.len() as u32;
-        let mut contact = Contact {
+        let mut contact = Condition {
             vertices: [0; 6],
             weights: [0.0; 6],
             count: 0,
             normal,
-            target: if keeps {
-                height.min(self.settings.trigger * self.settings.gap)
-            } else {
-                self.wanted(height)
-            },
+            target: if keeps { height.min(self.settings.least_gap()) } else { self.wanted(height) },
         };
         for (v, w) in vertices.into_iter().zip(weights) {
             if v < cloth {

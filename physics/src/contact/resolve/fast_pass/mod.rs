@@ -11,29 +11,25 @@ mod conditions;
 #[cfg(test)]
 mod tests;
 
-use std::time::Instant;
-
-use super::attempt::FEW_OF_ITSELF;
-use super::body::with_drawn;
+use super::attempt::FEW_SELF_PAIRS;
 use super::budget::Budget;
 use super::certificate::Certificate;
-use super::contact::{Contact, Plane};
-use super::garment::check;
+use super::condition::{Condition, Plane};
 use super::layer_constraint::outward;
 use super::obstacle::BodyObstacle;
-use super::outfit::Outfit;
+use super::packed_cloth::PackedCloth;
 use super::relax::{LastPasses, no_farther, relax};
 use super::self_intersections::part_self_intersections;
-use super::strain_relaxation::{StrainRelaxation, contact_mesh};
-use super::{Layer, ResolveError, ResolveSettings, Resolved, strain_relaxation};
+use super::strain_relaxation::{StrainRelaxation, TIMES, contact_mesh};
+use super::task::Task;
+use super::{ResolveSettings, Resolved};
 use crate::contact::step_filter::{ContactMesh, FacePairs, StepFilter};
-use crate::query::Surface;
 use rayon::prelude::*;
 
 /// Rings of neighbours around a defect that move along.
 const RINGS: usize = 2;
 /// Sweeps of the relaxation in a round.
-const SWEEPS: usize = 10;
+const FAST_SWEEPS: usize = 10;
 /// Rounds at most; stalling ends it long before.
 const ROUNDS: usize = 20;
 /// A round that leaves more than this share of the intersections hardly helps.
@@ -51,42 +47,20 @@ const ORDER_VIOLATIONS: f64 = 1e-2;
 /// What elements stay apart in a filtered step, as a share of the gap.
 const FILTER_MARGIN: f64 = 0.05;
 
-/// Takes `layers`, innermost first, out of `body` and out of each other where they lie hardly in: the result if no garment
+/// Takes the garments of `task` out of the body and out of each other where they lie hardly in: the result if no garment
 /// intersects the body or another one any more, at most eight pairs of triangles of one garment intersect, and no cloth has
-/// excess strain; else none. Deterministic for any number of threads; a clean input comes back to the bit.
-///
-/// # Errors
-/// Those of [`super::resolve`].
-pub fn fast_pass(
-    body: &Surface<f64>,
-    layers: &[Layer<'_>],
-    settings: &ResolveSettings,
-) -> Result<Option<Resolved>, ResolveError> {
-    settings.check()?;
-    check(body, layers)?;
-    let budget = &Budget::new(settings, layers.len());
-    let preparing = Instant::now();
-    Ok(with_drawn(body, layers, |drawn| {
-        budget.count_body(preparing);
-        passed_near(&drawn, layers, settings, budget)
-    }))
-}
-
-/// [`fast_pass`] on a body that is prepared near `layers`.
-pub(super) fn passed_near(
-    drawn: &BodyObstacle<'_>,
-    layers: &[Layer<'_>],
-    settings: &ResolveSettings,
-    budget: &Budget,
-) -> Option<Resolved> {
-    let outfit = Outfit::new(layers);
+/// excess strain; else none. Deterministic for any number of threads; a clean input comes back to the bit. The body is `drawn`
+/// near the garments.
+pub(super) fn fast_pass(drawn: &BodyObstacle<'_>, task: Task<'_>) -> Option<Resolved> {
+    let Task { layers, settings, budget } = task;
+    let outfit = PackedCloth::new(layers);
     let surface = drawn.surface;
     let near = drawn.tree.part().iter().map(|&f| &surface.faces[f as usize]);
     let mesh = contact_mesh(&outfit, surface.positions.len(), near);
     let mut pass = FastPass::new(&outfit, drawn, &mesh, settings);
     let rounds = pass.run(budget);
     let most_self_intersections = match mends_self_intersections(settings) {
-        true => FEW_OF_ITSELF,
+        true => FEW_SELF_PAIRS,
         false => pass.known_self_intersections.len(),
     };
     if pass.between() > 0
@@ -95,11 +69,9 @@ pub(super) fn passed_near(
     {
         return None;
     }
-    pass.relax_strain(budget);
-    let positions = pass.garments();
-    let certifying = Instant::now();
-    let certificate = pass.certificate(&positions);
-    budget.count_certificate(certifying);
+    pass.relax_strain(task);
+    let positions = outfit.split(&pass.positions);
+    let certificate = budget.certifying(|| pass.certificate(&positions));
     let mut resolved = Resolved { positions, certificate, ..Resolved::default() };
     resolved.compare_since(layers, budget);
     resolved.garments.iter_mut().for_each(|work| work.rounds = rounds);
@@ -123,7 +95,7 @@ fn is_good(certificate: &Certificate, most_self_intersections: usize) -> bool {
 
 /// The state of an outfit between rounds.
 struct FastPass<'a> {
-    outfit: &'a Outfit<'a>,
+    outfit: &'a PackedCloth<'a>,
     body: &'a BodyObstacle<'a>,
     settings: &'a ResolveSettings,
     filter: StepFilter<'a>,
@@ -139,21 +111,19 @@ struct FastPass<'a> {
     /// Pairs of the input's garments with themselves, ascending.
     known_self_intersections: FacePairs,
     /// Conditions that separated triangles so far: without them their neighbours would pull them in again.
-    remembered: Vec<Contact>,
+    remembered: Vec<Condition>,
 }
 
 impl<'a> FastPass<'a> {
     fn new(
-        outfit: &'a Outfit<'a>,
+        outfit: &'a PackedCloth<'a>,
         body: &'a BodyObstacle<'a>,
         mesh: &'a ContactMesh,
         settings: &'a ResolveSettings,
     ) -> Self {
-        let input: Vec<[f64; 3]> = outfit.layers.iter().flat_map(|l| l.positions).copied().collect();
+        let input = outfit.positions();
         let positions = [input.as_slice(), &body.surface.positions].concat();
         let filter = StepFilter::new(mesh, &positions);
-        let (shape, known_self_intersections) = (input.clone(), Vec::new());
-        let (outward, remembered) = (Vec::new(), Vec::new());
         let look = |p: &[f64; 3]| body.look(*p)?.plane;
         let planes = input.par_iter().with_min_len(128).map(look).collect();
         let mut pass = Self {
@@ -161,19 +131,19 @@ impl<'a> FastPass<'a> {
             body,
             settings,
             filter,
+            shape: input.clone(),
             input,
-            shape,
             positions,
             planes,
-            outward,
-            known_self_intersections,
-            remembered,
+            outward: Vec::new(),
+            known_self_intersections: Vec::new(),
+            remembered: Vec::new(),
         };
         pass.known_self_intersections = pass.self_pairs().copied().collect();
         pass
     }
 
-    /// Rounds until nothing intersects, a round hardly helps, or the `budget` is spent; how many it took.
+    /// Rounds until nothing intersects, a round hardly helps, or the budget is spent; how many it took.
     fn run(&mut self, budget: &Budget) -> usize {
         let mut left = self.left();
         if left == [0, 0] {
@@ -210,7 +180,7 @@ impl<'a> FastPass<'a> {
         let gap = SELF_GAP * self.settings.gap;
         contacts.extend(part_self_intersections(self.outfit, pairs, gap, &self.positions, (cloth, shape)).0);
         let (stretch, most) = (self.settings.stretch, self.settings.farthest);
-        relax(self.outfit, cloth, &self.shape, region, &contacts, stretch, (SWEEPS, LastPasses::FEW));
+        relax(self.outfit, cloth, &self.shape, region, &contacts, stretch, (FAST_SWEEPS, LastPasses::FEW));
         for &v in region {
             cloth[v as usize] = no_farther(self.input[v as usize], cloth[v as usize], most);
         }
@@ -223,12 +193,11 @@ impl<'a> FastPass<'a> {
     }
 
     /// Relaxes strain, unless limits are strict.
-    fn relax_strain(&mut self, budget: &Budget) {
+    fn relax_strain(&mut self, task: Task<'_>) {
         if self.settings.loosened > 1.0 {
             let before = self.positions.clone();
-            let is_late = || budget.is_late();
-            let relaxing = StrainRelaxation::new(self.outfit, self.settings);
-            relaxing.relax_strain(&mut self.filter, &mut self.positions, strain_relaxation::TIMES, is_late);
+            let relaxing = StrainRelaxation::new(self.outfit, task);
+            relaxing.relax_strain(&mut self.filter, &mut self.positions, TIMES);
             self.look_again(&before);
         }
     }
@@ -240,11 +209,6 @@ impl<'a> FastPass<'a> {
         moved.filter(|((_, from), to)| from != to).for_each(|((plane, _), to)| {
             *plane = body.look(*to).and_then(|view| view.plane);
         });
-    }
-
-    /// Positions of every garment.
-    fn garments(&self) -> Vec<Vec<[f64; 3]>> {
-        (0..self.outfit.len()).map(|g| self.outfit.part(&self.positions, g).to_vec()).collect()
     }
 
     /// Pairs that are left of garments with the body and with each other, but for pinched ones.

@@ -3,9 +3,11 @@
 use super::super::garment::at;
 use super::super::tests::layers;
 use super::*;
+use crate::contact::resolve::budget::Budget;
 use crate::contact::resolve::{RestGarment, certify};
 use crate::mesh::TriMesh;
 use crate::mesh::shapes::{self, SplitMix};
+use crate::query::Surface;
 
 /// Tubes over each other around a trunk, each with slight bulges that reach into its neighbours.
 fn scene(random: &mut SplitMix, layers: usize, bulge: f64) -> (Surface<f64>, Vec<TriMesh>) {
@@ -27,7 +29,9 @@ fn scene(random: &mut SplitMix, layers: usize, bulge: f64) -> (Surface<f64>, Vec
 fn passed(body: &Surface<f64>, meshes: &[TriMesh]) -> Option<Resolved> {
     let garments: Vec<RestGarment> = meshes.iter().map(RestGarment::new).collect();
     let layers = layers(&garments, meshes.iter().map(TriMesh::positions));
-    let found = fast_pass(body, &layers, &ResolveSettings::default()).unwrap();
+    let settings = &ResolveSettings::default();
+    let task = Task { layers: &layers, settings, budget: &Budget::new(settings, layers.len()) };
+    let found = fast_pass(&BodyObstacle::near_layers(body, &layers), task);
     if let Some(found) = &found {
         let mut again = certify(body, &at(&layers, &found.positions)).unwrap();
         again.strain_added = found.certificate.strain_added;

@@ -1,8 +1,8 @@
 //! What a certificate counts.
 
 use super::*;
-use crate::contact::resolve::body::with_drawn;
 use crate::contact::resolve::count::certified;
+use crate::contact::resolve::obstacle::BodyObstacle;
 
 /// Depths under the body and under inner layers are counted apart.
 #[test]
@@ -32,6 +32,6 @@ fn what_went_far_is_certified_against_all_that_is_there() {
     let up = vec![scene.positions[0].iter().map(|p| add(*p, [0.0, 0.75, 0.0])).collect::<Vec<_>>()];
     let faces = scene.garments[0].faces();
     let expected = brute_force_pairs(&[(body.positions(), body.faces()), (&up[0], faces)]);
-    let found = with_drawn(&scene.body, &layers, |drawn| certified(&drawn, &layers, &up));
+    let found = certified(&BodyObstacle::near_layers(&scene.body, &layers), &layers, &up);
     assert!(expected > 20 && found.body_triangle_pairs == expected);
 }

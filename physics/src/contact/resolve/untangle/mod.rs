@@ -4,20 +4,21 @@ mod step;
 
 use rayon::prelude::*;
 
+use super::ResolveSettings;
 use super::budget::Budget;
-use super::contact::{Contact, Plane};
+use super::condition::{Condition, Plane};
 use super::contact_orientation::ContactOrientation;
 use super::defects::Defects;
 use super::detect::IntersectingPairs;
 use super::layer_constraint::{LayerConstraint, layer_constraints, outward};
 use super::obstacle::BodyObstacle;
-use super::outfit::Outfit;
-use super::{Layer, ResolveSettings};
+use super::packed_cloth::PackedCloth;
+use super::task::Task;
+use crate::contact::ORDER_RADIUS;
 use crate::query::triangle_tree::{KeptTree, TriangleTree, self_triangle_pairs};
-use crate::vec3::dot;
 
 /// A vertex nearer to a half-space than this (m) is kept out of it: smoothing may carry it there.
-const WATCH: f64 = 0.01;
+const WATCHED: f64 = 0.01;
 /// Rounds without progress after which an outfit is left as it is.
 const PATIENCE: usize = 8;
 /// The same where cloth keeps its contact orientation: that ends soon or never.
@@ -28,8 +29,8 @@ const PATIENCE_IN_LONG_STEP: usize = 3;
 const ROUNDS_FOR_GAPS: usize = 3;
 
 /// The state of an outfit between rounds.
-pub(super) struct Untangling<'a> {
-    outfit: &'a Outfit<'a>,
+pub(super) struct UntanglingState<'a> {
+    outfit: &'a PackedCloth<'a>,
     body: &'a BodyObstacle<'a>,
     settings: &'a ResolveSettings,
     budget: &'a Budget,
@@ -39,7 +40,7 @@ pub(super) struct Untangling<'a> {
     input: Vec<[f64; 3]>,
     /// The shape that displacements are measured from: the input, with its crumples smoothed.
     shape: Vec<[f64; 3]>,
-    pub positions: Vec<[f64; 3]>,
+    positions: Vec<[f64; 3]>,
     /// Distance of every vertex to the body's exposed surface, without sign (m).
     far: Vec<f64>,
     /// The half-space that the body leaves to every vertex; none where the body is pinched.
@@ -53,21 +54,21 @@ pub(super) struct Untangling<'a> {
     /// Intersections of the input's garments with themselves, ascending.
     known_self_intersections: Vec<(u32, u32)>,
     /// Conditions of all intersections so far: without them its neighbours would pull a mended place apart again.
-    remembered: Vec<Contact>,
+    remembered: Vec<Condition>,
     /// Orders the sheets, if it is known from a step before; otherwise the outward directions do.
     orientation: Option<&'a ContactOrientation>,
 }
 
 /// The best state so far.
 #[derive(Default)]
-struct Best {
+struct BestState {
     defects: Option<Defects>,
     positions: Vec<[f64; 3]>,
     /// Rounds since it was found.
     stale: usize,
 }
 
-impl Best {
+impl BestState {
     fn look(&mut self, defects: Defects, positions: &[[f64; 3]]) {
         self.stale += 1;
         if self.defects.is_none_or(|least| defects < least) {
@@ -76,14 +77,14 @@ impl Best {
     }
 }
 
-impl<'a> Untangling<'a> {
-    pub fn new(
-        outfit: &'a Outfit<'a>,
+impl<'a> UntanglingState<'a> {
+    fn new(
+        outfit: &'a PackedCloth<'a>,
         body: &'a BodyObstacle<'a>,
-        settings: &'a ResolveSettings,
-        (budget, orientation): (&'a Budget, Option<&'a ContactOrientation>),
+        Task { settings, budget, .. }: Task<'a>,
+        orientation: Option<&'a ContactOrientation>,
     ) -> Self {
-        let input: Vec<[f64; 3]> = outfit.layers.iter().flat_map(|l| l.positions).copied().collect();
+        let input = outfit.positions();
         let count = input.len();
         let mut untangling = Self {
             outfit,
@@ -118,7 +119,7 @@ impl<'a> Untangling<'a> {
 
     /// Rounds of detection and relaxation until nothing is wrong or nothing gets better. Where intersections are left, a second
     /// attempt with wider limits is kept if it ends with none.
-    pub fn run(&mut self) {
+    fn run(&mut self) {
         self.detect();
         self.known_self_intersections.clone_from(&self.intersections.self_pairs);
         self.attempt();
@@ -140,7 +141,7 @@ impl<'a> Untangling<'a> {
 
     /// Rounds within the limits as they are. The intersections are those of the positions afterwards.
     fn attempt(&mut self) {
-        let mut best = Best::default();
+        let mut best = BestState::default();
         let patience = match (self.orientation, self.settings.is_patient) {
             (Some(_), _) => PATIENCE_WITH_ORIENTATION,
             (None, true) => PATIENCE,
@@ -177,12 +178,12 @@ impl<'a> Untangling<'a> {
 
     /// Up to which distance half-spaces and sheets are remembered (m).
     fn watch(&self) -> f64 {
-        WATCH.max(self.settings.trigger * self.settings.gap)
+        WATCHED.max(self.settings.least_gap())
     }
 
     /// The distance that counts as too close in a round: what is merely close is left alone after the first ones.
     fn least(&self, round: usize) -> f64 {
-        if round < ROUNDS_FOR_GAPS { self.settings.trigger * self.settings.gap } else { 0.0 }
+        if round < ROUNDS_FOR_GAPS { self.settings.least_gap() } else { 0.0 }
     }
 
     fn is_violated(&self, plane: &Plane, round: usize) -> bool {
@@ -199,7 +200,7 @@ impl<'a> Untangling<'a> {
                 TriangleTree::refitted(tree, outfit.part(positions, g), &outfit.layers[g].garment.faces)
             })
             .collect();
-        let reach = (self.settings.reach, self.watch());
+        let reach = (ORDER_RADIUS, self.watch());
         if self.orientation.is_none() {
             self.over = layer_constraints(outfit, &trees, positions, &self.outward, reach);
         }
@@ -220,11 +221,11 @@ impl<'a> Untangling<'a> {
             let (p, away) = (self.positions[v as usize], self.outward[v as usize]);
             let view = self.body.look(p);
             let plane = view.and_then(|b| b.plane);
-            // More than half way through a limb the nearest way out is its other side: cloth goes back to its own.
-            let is_through = !self.settings.is_shallow
-                && plane.is_some_and(|plane| plane.distance < 0.0 && dot(plane.normal, away) < 0.0);
-            let back = if is_through { self.body.exit(p, away, self.settings.farthest) } else { None };
-            (view.map_or(f64::INFINITY, |b| b.far), back.or(plane))
+            let plane = match self.settings.is_shallow {
+                true => plane,
+                false => self.body.back_from_through(plane, p, away, self.settings.farthest),
+            };
+            (view.map_or(f64::INFINITY, |b| b.far), plane)
         };
         let found: Vec<_> = moved.par_iter().with_min_len(128).map(look).collect();
         for (&v, (far, plane)) in moved.iter().zip(found) {
@@ -243,31 +244,17 @@ impl<'a> Untangling<'a> {
     }
 
     /// Intersecting pairs between garments, and with the body where it does not yield.
-    pub fn intersections(&self) -> usize {
+    fn intersections(&self) -> usize {
         let is_seen = |&&(_, other): &&(u32, u32)| !self.body.yielded(other);
-        self.layer_intersections() + self.intersections.body.iter().filter(is_seen).count()
-    }
-
-    /// Intersecting pairs between garments.
-    fn layer_intersections(&self) -> usize {
         let corners = |f: u32| self.outfit.faces[f as usize].map(|v| self.positions[v as usize]);
         let is_pinch = |f: u32| self.body.is_pinch_at(&corners(f));
-        self.intersections.layers.iter().filter(|&&(f, g)| !(is_pinch(f) && is_pinch(g))).count()
-    }
-
-    /// All intersecting pairs with the body.
-    pub fn body_intersections(&self) -> usize {
-        self.intersections.body.len()
-    }
-
-    /// Intersecting pairs of garments with themselves.
-    pub fn self_intersections(&self) -> usize {
-        self.intersections.self_pairs.len()
+        let is_counted = |&&(f, g): &&(u32, u32)| !(is_pinch(f) && is_pinch(g));
+        self.intersections.layers.iter().filter(is_counted).count()
+            + self.intersections.body.iter().filter(is_seen).count()
     }
 }
 
 /// The result of untangling.
-#[derive(Clone, Default)]
 pub(super) struct Untangled {
     pub positions: Vec<Vec<[f64; 3]>>,
     /// Pairs with the body where it does not yield, and between garments, without pinched ones.
@@ -288,36 +275,26 @@ impl Untangled {
     }
 }
 
+/// The garments of `task` outside of `body` and in their order, as far as it gets; with the contact orientation of a step before,
+/// if there is one.
 pub(super) fn untangled(
     body: &BodyObstacle<'_>,
-    layers: &[Layer<'_>],
-    settings: &ResolveSettings,
-    budget: &Budget,
-) -> Untangled {
-    untangled_keeping(None, body, layers, settings, budget)
-}
-
-/// [`untangled`] with the contact orientation of a step before.
-pub(super) fn untangled_keeping(
+    task: Task<'_>,
     orientation: Option<&ContactOrientation>,
-    body: &BodyObstacle<'_>,
-    layers: &[Layer<'_>],
-    settings: &ResolveSettings,
-    budget: &Budget,
 ) -> Untangled {
-    let outfit = Outfit::new(layers);
-    let mut untangling = Untangling::new(&outfit, body, settings, (budget, orientation));
+    let Task { layers, settings, .. } = task;
+    let outfit = PackedCloth::new(layers);
+    let mut untangling = UntanglingState::new(&outfit, body, task, orientation);
     untangling.run();
-    let positions: Vec<Vec<_>> =
-        (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
+    let positions = outfit.split(&untangling.positions);
     // Where contact orientation is kept, pinched pairs have been counted already.
     let self_intersections = match settings.self_contact && orientation.is_none() {
         true => {
             let garments = layers.iter().zip(&positions);
             garments.map(|(layer, now)| self_triangle_pairs(now, layer.garment.faces()).len()).sum()
         }
-        false => untangling.self_intersections(),
+        false => untangling.intersections.self_pairs.len(),
     };
-    let (intersections, with_body) = (untangling.intersections(), untangling.body_intersections());
-    Untangled { positions, intersections, with_body, self_intersections }
+    let with_body = untangling.intersections.body.len();
+    Untangled { positions, intersections: untangling.intersections(), with_body, self_intersections }
 }

@@ -3,7 +3,7 @@
 
 use super::super::InnerLayer;
 use super::*;
-use crate::energy::{ContactPoints, LayerContact};
+use crate::energy::{ContactPoints, LayerContact, LayerGate};
 use crate::mesh::shapes::{self, SplitMix};
 use crate::query::brute_force;
 use crate::vec3::norm;
@@ -15,7 +15,7 @@ fn settings() -> EnergySettings {
 }
 
 fn garment(mesh: &TriMesh) -> InnerLayer {
-    InnerLayer::new(mesh, &Topology::new(mesh), mesh.median_edge_length())
+    InnerLayer::new(mesh, &Topology::new(mesh))
 }
 
 /// Points without a garment.

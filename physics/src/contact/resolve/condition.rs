@@ -1,7 +1,6 @@
 //! Linear conditions on a garment's vertices, and where two triangles that intersect ask for them.
 
 use crate::contact::Triangle;
-use crate::query::SurfacePoint;
 use crate::vec3::{add_scaled, axpy, cross, dot, norm_squared, normalized, sub};
 
 /// The half-space that the surface nearest to a point leaves to it: `normal·x ≥ offset`.
@@ -17,21 +16,9 @@ pub(super) struct Plane {
     pub is_held: bool,
 }
 
-impl Plane {
-    pub fn at(found: &SurfacePoint, normal: [f64; 3], distance: f64, is_held: bool) -> Self {
-        let offset = dot(normal, found.position);
-        Self { normal, offset, distance, is_held }
-    }
-
-    /// Signed distance of the point that asked (m), and the direction away from the obstacle.
-    pub fn seen(&self) -> (f64, [f64; 3]) {
-        (self.distance, self.normal)
-    }
-}
-
 /// `Σ weight·(vertex·normal) ≥ target` over up to six vertices.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Contact {
+pub(super) struct Condition {
     pub vertices: [u32; 6],
     pub weights: [f64; 6],
     pub count: u8,
@@ -39,24 +26,25 @@ pub(super) struct Contact {
     pub target: f64,
 }
 
-impl Contact {
+impl Condition {
+    /// Of up to six vertices with a weight each.
+    pub fn new<const N: usize>(vertices: [u32; N], weights: [f64; N], normal: [f64; 3], target: f64) -> Self {
+        let mut contact =
+            Self { vertices: [vertices[0]; 6], weights: [0.0; 6], count: N as u8, normal, target };
+        contact.vertices[..N].copy_from_slice(&vertices);
+        contact.weights[..N].copy_from_slice(&weights);
+        contact
+    }
+
     /// A vertex on the right side of a plane, `gap` away.
     pub fn vertex(v: u32, plane: &Plane, gap: f64) -> Self {
-        let mut weights = [0.0; 6];
-        weights[0] = 1.0;
-        Self { vertices: [v; 6], weights, count: 1, normal: plane.normal, target: plane.offset + gap }
+        Self::new([v], [1.0], plane.normal, plane.offset + gap)
     }
 
     /// Vertex `v` over a point of face `lower`, at least `gap` along `normal`.
     pub fn vertex_over(v: u32, (lower, at_lower): ([u32; 3], [f64; 3]), normal: [f64; 3], gap: f64) -> Self {
-        let weights = [1.0, -at_lower[0], -at_lower[1], -at_lower[2], 0.0, 0.0];
-        Self { vertices: [v, lower[0], lower[1], lower[2], v, v], weights, count: 4, normal, target: gap }
-    }
-
-    /// A point of a face, at least `target` along `normal`.
-    pub fn face_point(face: [u32; 3], barycentric: [f64; 3], normal: [f64; 3], target: f64) -> Self {
-        let ([a, b, c], [u, v, w]) = (face, barycentric);
-        Self { vertices: [a, b, c, a, a, a], weights: [u, v, w, 0.0, 0.0, 0.0], count: 3, normal, target }
+        let ([a, b, c], [x, y, z]) = (lower, at_lower);
+        Self::new([v, a, b, c], [1.0, -x, -y, -z], normal, gap)
     }
 
     /// A point of face `upper` over a point of face `lower`, at least `gap` along `normal`.
@@ -66,20 +54,9 @@ impl Contact {
         normal: [f64; 3],
         gap: f64,
     ) -> Self {
-        let vertices = [upper[0], upper[1], upper[2], lower[0], lower[1], lower[2]];
-        let weights = [at_upper[0], at_upper[1], at_upper[2], -at_lower[0], -at_lower[1], -at_lower[2]];
-        Self { vertices, weights, count: 6, normal, target: gap }
-    }
-
-    /// A point of the first edge over a point of the second, places 0–1 on each, at least `gap` along `normal`.
-    pub fn edges(
-        [[p, q], [r, s]]: [[u32; 2]; 2],
-        [first, second]: [f64; 2],
-        normal: [f64; 3],
-        gap: f64,
-    ) -> Self {
-        let weights = [1.0 - first, first, second - 1.0, -second, 0.0, 0.0];
-        Self { vertices: [p, q, r, s, p, p], weights, count: 4, normal, target: gap }
+        let ([a, b, c], [d, e, f]) = (upper, lower);
+        let ([u, v, w], [x, y, z]) = (at_upper, at_lower);
+        Self::new([a, b, c, d, e, f], [u, v, w, -x, -y, -z], normal, gap)
     }
 
     /// The same condition on vertices numbered from `start` on.
@@ -229,7 +206,7 @@ mod tests {
     #[test]
     fn enforcing_meets_the_condition_and_moves_only_what_may_move() {
         let mut positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let contact = Contact::face_point([0, 1, 2], [0.2, 0.3, 0.5], [0.0, 0.0, 1.0], 0.1);
+        let contact = Condition::new([0, 1, 2], [0.2, 0.3, 0.5], [0.0, 0.0, 1.0], 0.1);
         assert!(contact.enforce(&mut positions, &[true, false, true]));
         assert_eq!(positions[1], [1.0, 0.0, 0.0]);
         let height = 0.2 * positions[0][2] + 0.5 * positions[2][2];

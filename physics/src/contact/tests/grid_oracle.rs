@@ -1,5 +1,5 @@
 //! Intersections of triangles on an integer grid: an oracle that shares no formula with the predicates of
-//! [`crate::contact`].
+//! the library.
 //!
 //! Separating axes in 128-bit integers. Coordinates below 2²² keep every product below 2¹²⁰.
 
@@ -46,12 +46,12 @@ pub fn meet(a: &[GridPoint], b: &[GridPoint; 3]) -> bool {
     })
 }
 
-/// As [`crate::contact::triangles_intersect`].
+/// As [`triangles_intersect`](super::triangles_intersect) of the library.
 pub fn triangles_intersect(a: &[GridPoint; 3], b: &[GridPoint; 3]) -> bool {
     normal(a) != [0; 3] && normal(b) != [0; 3] && meet(a, b)
 }
 
-/// As [`crate::contact::mesh_triangles_intersect`] for two faces of a mesh; `meet_beyond` decides of two triangles that share
+/// As its namesake in the library for two faces of a mesh; `meet_beyond` decides of two triangles that share
 /// their first corner alone.
 pub fn mesh_triangles_intersect(
     points: &[GridPoint],

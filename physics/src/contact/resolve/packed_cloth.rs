@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::Layer;
 
 /// All garments packed one behind the other, innermost first.
-pub(super) struct Outfit<'a> {
+pub(super) struct PackedCloth<'a> {
     pub layers: &'a [Layer<'a>],
     /// First vertex of every garment, and the end.
     vertex_starts: Vec<u32>,
@@ -16,7 +16,7 @@ pub(super) struct Outfit<'a> {
     pub faces: Vec<[u32; 3]>,
 }
 
-impl<'a> Outfit<'a> {
+impl<'a> PackedCloth<'a> {
     pub fn new(layers: &'a [Layer<'a>]) -> Self {
         let mut outfit = Self {
             layers,
@@ -71,6 +71,16 @@ impl<'a> Outfit<'a> {
         &packed[range.start as usize..range.end as usize]
     }
 
+    /// A packed array garment by garment.
+    pub fn split<T: Clone>(&self, packed: &[T]) -> Vec<Vec<T>> {
+        (0..self.len()).map(|g| self.part(packed, g).to_vec()).collect()
+    }
+
+    /// Positions of all garments, one behind the other.
+    pub fn positions(&self) -> Vec<[f64; 3]> {
+        self.layers.iter().flat_map(|layer| layer.positions).copied().collect()
+    }
+
     /// Neighbours of packed vertex `v` along edges, ascending.
     pub fn ring(&self, v: u32) -> impl ExactSizeIterator<Item = u32> {
         let g = self.garment_of(v);
@@ -88,26 +98,17 @@ impl<'a> Outfit<'a> {
     /// Vertices within `rings` edges of `seeds`, ascending.
     pub fn neighbourhood(&self, seeds: &[u32], rings: usize) -> Vec<u32> {
         let mut is_in = vec![false; self.vertex_count()];
-        let mut all: Vec<u32> = Vec::new();
-        let mut front: Vec<u32> = Vec::new();
-        for &v in seeds {
-            if !std::mem::replace(&mut is_in[v as usize], true) {
-                front.push(v);
-            }
-        }
+        let mut is_new = |v: &u32| !std::mem::replace(&mut is_in[*v as usize], true);
+        let mut all: Vec<u32> = seeds.iter().copied().filter(&mut is_new).collect();
+        let mut inner = 0;
         for _ in 0..rings {
-            let mut next = Vec::new();
-            for &v in &front {
-                for n in self.ring(v) {
-                    if !std::mem::replace(&mut is_in[n as usize], true) {
-                        next.push(n);
-                    }
-                }
+            let ring = inner..all.len();
+            inner = ring.end;
+            for at in ring {
+                let v = all[at];
+                all.extend(self.ring(v).filter(&mut is_new));
             }
-            all.append(&mut front);
-            front = next;
         }
-        all.append(&mut front);
         all.sort_unstable();
         all
     }
