@@ -18,7 +18,7 @@ use crate::config::ModelConfig;
 use crate::initializer::{Initializer, fan_in_bound};
 use crate::linear::Linear;
 use crate::ops::{
-    Activation, SirenArguments, activate_packed, activate_packed_sum, modulated_siren, product, runs_on_host,
+    Activation, SirenArguments, activate_packed, activate_packed_sum, lies_on_host, modulated_siren, product,
     sine_modulation, split_columns,
 };
 use crate::packing::Packing;
@@ -174,7 +174,7 @@ impl ModulatedSiren {
     ) -> Tensor<2> {
         let rows = self.modulator.rows(garment);
         // A single layer has no weights between layers to hand over.
-        if self.sine.len() > 1 && runs_on_host(&coordinates) {
+        if self.sine.len() > 1 && lies_on_host(&coordinates) {
             return self.fused(coordinates, vertex_product, rows, packing);
         }
         self.layer_by_layer(coordinates, vertex_product, rows, packing)

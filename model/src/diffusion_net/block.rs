@@ -8,7 +8,7 @@ use crate::initializer::{Initializer, fan_in_bound};
 use crate::linear::Linear;
 use crate::ops::{
     Activation, DiffusionMlpArguments, activate, activate_residual, diffusion_mlp, gradient_features,
-    product, product_add, runs_on_host,
+    lies_on_host, product, product_add,
 };
 use crate::tensors::GarmentTensors;
 
@@ -71,7 +71,7 @@ impl DiffusionBlock {
 
     /// `[V,C]` → `[V,C]`.
     pub fn forward(&self, features: Tensor<2>, garment: &GarmentTensors) -> Tensor<2> {
-        let fused = runs_on_host(&features);
+        let fused = lies_on_host(&features);
         self.forward_in_form(features, garment, fused)
     }
 

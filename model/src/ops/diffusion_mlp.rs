@@ -1,14 +1,13 @@
 //! What a DiffusionNet block does at every vertex, as one operation in host memory: gradient features and the MLP.
 
-use burn::backend::Backend;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
-use super::host::{HostBackend, MatrixView};
-use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
-use super::row_blocks::HOST_ONLY;
+use super::host::HostBackend;
+use super::operation::{
+    ArgumentGradients, BackwardPass, FusedOps, Operation, Saved, Saves, TensorKernel, apply,
+};
 use super::tensors::Tensors;
-use super::tile::StridedMatrix;
 
 mod backward;
 mod forward;
@@ -37,7 +36,7 @@ pub struct DiffusionMlpArguments {
     pub output: [Tensor<2>; 2],
 }
 
-/// `x + MLP(x, Φ·diffused, gradient features)` `[V,C]`, where the tensors [lie in host memory](super::runs_on_host).
+/// `x + MLP(x, Φ·diffused, gradient features)` `[V,C]`, where the tensors [lie in host memory](super::lies_on_host).
 ///
 /// With `x0 x1 x2` and `y0 y1 y2` for the three `coefficients` expanded to both axes, the gradient features are
 /// `tanh(x0 (x1 − y2) + y0 (y1 + x2))`.
@@ -65,9 +64,6 @@ pub fn diffusion_mlp(arguments: DiffusionMlpArguments) -> Tensor<2> {
     apply(DiffusionMlp { recorded: false }, arguments)
 }
 
-/// Matrices `[V,C]` that the backward pass reads: x0, y0, x1 − y2, y1 + x2, gradient features, both hidden layers.
-const STATES: usize = 7;
-
 /// Arguments in the order of [`DiffusionMlpArguments`].
 #[derive(Clone, Debug)]
 struct DiffusionMlp {
@@ -76,12 +72,8 @@ struct DiffusionMlp {
 }
 
 impl TensorKernel for DiffusionMlp {
-    fn composed<B: Backend>(&self, _: Tensors<B>) -> Tensors<B> {
-        unreachable!("{HOST_ONLY}")
-    }
-
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        forward::run::<B>(self, arguments.take())
+        forward::run::<B>(self.recorded, arguments.take())
     }
 }
 
@@ -96,32 +88,17 @@ impl Operation<14> for DiffusionMlp {
         Saves { arguments: std::array::from_fn(saved), result: false }
     }
 
+    /// Of all arguments but the bases.
+    fn gradients_on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        backward::run::<B>(arguments.take())
+    }
+
     fn backward<B: FusedOps>(
         &self,
         saved: Saved<B, 14>,
         gradient: FloatTensor<B>,
     ) -> ArgumentGradients<B, 14> {
-        let mut gradients = B::run(&DiffusionMlpGradients, saved.with(gradient)).0.into_iter();
+        let mut gradients = B::run(&BackwardPass(self), saved.with(gradient)).0.into_iter();
         std::array::from_fn(|argument| if matches!(argument, 1 | 2) { None } else { gradients.next() })
     }
-}
-
-/// Gradients of all arguments but the bases, from features, bases, weights, what the forward pass recorded and the gradient of
-/// the result.
-#[derive(Clone, Debug)]
-struct DiffusionMlpGradients;
-
-impl TensorKernel for DiffusionMlpGradients {
-    fn composed<B: Backend>(&self, _: Tensors<B>) -> Tensors<B> {
-        unreachable!("{HOST_ONLY}")
-    }
-
-    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        backward::run::<B>(arguments.take())
-    }
-}
-
-/// The gradients of the eigenvectors along both axes, from a vertex on.
-fn axes(gradient_basis: &MatrixView<'_>, vertex: usize) -> [StridedMatrix; 2] {
-    [0, 1].map(|axis| gradient_basis.strided().from(axis * gradient_basis.rows() / 2 + vertex, 0))
 }

@@ -3,19 +3,16 @@
 //! A block of rows goes through all layers before the next one, so that what the layers hand on stays in a core's caches.
 //! The backward pass reads the phases and the gates of the forward pass and computes the rest again.
 
-use burn::backend::Backend;
-use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
-use super::host::{HostBackend, MatrixView};
-use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
-use super::row_blocks::{HOST_ONLY, factor, square_factors, transposed_factor};
+use super::host::HostBackend;
+use super::operation::{Operation, Saves, TensorKernel, apply};
 use super::tensors::Tensors;
-use super::tile::RightFactor;
 use crate::packing::Packing;
 
 mod backward;
 mod forward;
+mod weights;
 
 /// What a modulated SIREN of L > 1 layers with W units is applied to, and its parameters.
 pub struct SirenArguments {
@@ -39,7 +36,7 @@ pub struct SirenArguments {
     pub output_bias: Tensor<2>,
 }
 
-/// Values `[N,O]`, where the tensors [lie in host memory](super::runs_on_host).
+/// Values `[N,O]`, where the tensors [lie in host memory](super::lies_on_host).
 pub fn modulated_siren(
     arguments: SirenArguments,
     [omega_first, omega_hidden]: [f64; 2],
@@ -74,39 +71,9 @@ struct ModulatedSirenLayers {
     recorded: bool,
 }
 
-/// Right factors of the products of a pass.
-struct Weights {
-    gates: Vec<RightFactor>,
-    first: RightFactor,
-    sines: Vec<RightFactor>,
-    output: RightFactor,
-}
-
-impl Weights {
-    /// Of the weights between gates, of the first sine layer, of the others and of the output layer.
-    fn new([gates, first, sines, output]: [MatrixView<'_>; 4], transposed: bool) -> Self {
-        let factor = if transposed { transposed_factor } else { factor };
-        Self {
-            gates: square_factors(gates, transposed),
-            first: factor(first),
-            sines: square_factors(sines, transposed),
-            output: factor(output),
-        }
-    }
-
-    /// Of sine layer `layer`, counted from 0.
-    fn sine(&self, layer: usize) -> &RightFactor {
-        layer.checked_sub(1).map_or(&self.first, |hidden| &self.sines[hidden])
-    }
-}
-
 impl TensorKernel for ModulatedSirenLayers {
-    fn composed<B: Backend>(&self, _: Tensors<B>) -> Tensors<B> {
-        unreachable!("{HOST_ONLY}")
-    }
-
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        forward::run::<B>(self, arguments.take())
+        forward::run::<B>(&self.omegas, &self.packing, self.recorded, arguments.take())
     }
 }
 
@@ -115,25 +82,12 @@ impl Operation<9> for ModulatedSirenLayers {
         Self { recorded: true, ..self }
     }
 
+    /// Coordinates and weights.
     fn saves(&self, _: [bool; 9]) -> Saves<9> {
         Saves { arguments: [true, false, false, true, true, true, false, true, false], result: false }
     }
 
-    fn backward<B: FusedOps>(&self, saved: Saved<B, 9>, gradient: FloatTensor<B>) -> ArgumentGradients<B, 9> {
-        B::run(&SirenGradients(self.clone()), saved.with(gradient)).take().map(Some)
-    }
-}
-
-/// Gradients of all arguments from coordinates, weights, phases, gates and the gradient of the result.
-#[derive(Clone, Debug)]
-struct SirenGradients(ModulatedSirenLayers);
-
-impl TensorKernel for SirenGradients {
-    fn composed<B: Backend>(&self, _: Tensors<B>) -> Tensors<B> {
-        unreachable!("{HOST_ONLY}")
-    }
-
-    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        backward::run::<B>(&self.0, arguments.take())
+    fn gradients_on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        backward::run::<B>(&self.omegas, &self.packing, arguments.take())
     }
 }

@@ -1,11 +1,10 @@
 //! One Adam update.
 
+use burn::backend::TensorMetadata;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::super::adam::AdamFactors;
-use super::{GpuTensor, Matrix, empty, groups};
-use burn::backend::TensorMetadata;
+use super::matrix::{GpuTensor, Matrix, empty, groups};
 
 #[cube(launch_unchecked)]
 fn update(
@@ -33,8 +32,13 @@ fn update(
     }
 }
 
-/// Parameter and both moments after an update; see [`adam_step`](super::super::adam_step).
-pub(in crate::ops) fn adam(arguments: [GpuTensor; 4], factors: AdamFactors) -> [GpuTensor; 3] {
+/// Parameter and both moments after an update; see [`adam_step`](crate::ops::adam_step).
+pub(in crate::ops) fn adam(
+    arguments: [GpuTensor; 4],
+    [beta_1, beta_2]: [f32; 2],
+    step_size: f32,
+    epsilon: f32,
+) -> [GpuTensor; 3] {
     let shape = arguments[0].shape();
     let [parameter, gradient, first, second] = arguments.map(Matrix::new);
     parameter.assert_like([&gradient, &first, &second]);
@@ -42,7 +46,6 @@ pub(in crate::ops) fn adam(arguments: [GpuTensor; 4], factors: AdamFactors) -> [
     let results = [(); 3].map(|()| empty(&parameter.tensor, shape.clone()));
     let outputs = results.clone().map(Matrix::new);
     let (groups, dim) = groups(parameter.client(), count);
-    let AdamFactors { beta_1, beta_2, step_size, epsilon } = factors;
     // SAFETY: units beyond the last entry do nothing.
     unsafe {
         update::launch_unchecked(

@@ -5,7 +5,7 @@ use std::ops::Range;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::{Matrix, UNITS};
+use super::matrix::{Matrix, UNITS};
 
 /// Columns (of whole vectors) that one group works on at a time.
 const LANES: usize = 32;

@@ -6,7 +6,7 @@ use burn_cubecl::cubecl;
 use burn_cubecl::kernel::into_contiguous;
 use cubecl::prelude::*;
 
-use super::{GpuTensor, UNITS, empty, groups};
+use super::matrix::{GpuTensor, UNITS, buffer, empty, groups};
 
 /// Most groups that add up one tensor.
 const MOST_GROUPS: usize = 64;
@@ -53,8 +53,8 @@ fn launch_sums(values: &GpuTensor, partial: &GpuTensor, offset: usize, groups: u
             &values.client,
             CubeCount::Static(groups as u32, 1, 1),
             CubeDim::new_1d(UNITS),
-            super::buffer(values, count, 1),
-            super::buffer(partial, partials, 1),
+            buffer(values, count, 1),
+            buffer(partial, partials, 1),
             count,
             offset,
             groups,
@@ -100,9 +100,9 @@ pub(in crate::ops) fn scale(values: GpuTensor, factor: GpuTensor) -> GpuTensor {
             &values.client,
             groups,
             dim,
-            super::buffer(&values, count, 1),
-            super::buffer(&factor, 1, 1),
-            super::buffer(&output, count, 1),
+            buffer(&values, count, 1),
+            buffer(&factor, 1, 1),
+            buffer(&output, count, 1),
             count,
         );
     }

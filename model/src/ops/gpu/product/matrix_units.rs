@@ -12,8 +12,7 @@ use cubecl::ir::{ElemType, FloatKind};
 use cubecl::prelude::*;
 use half::bf16;
 
-use super::factor::{Transposed, read_tile};
-use super::{TILE, UNITS};
+use super::factor::{TILE, Transposed, UNITS, read_tile};
 
 /// Terms of the sum that a tile holds.
 pub(super) const DEPTH: usize = 32;

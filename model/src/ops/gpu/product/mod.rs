@@ -10,8 +10,9 @@ mod plain;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::{GpuTensor, Matrix};
-use factor::{Factor, Sizes, Transposed};
+use super::column_sums::total;
+use super::matrix::GpuTensor;
+use factor::{Factor, Sizes, TILE, Transposed, UNITS};
 
 /// Groups that keep a large GPU busy: two on each of its 132 multiprocessors.
 const ENOUGH_GROUPS: usize = 264;
@@ -23,10 +24,6 @@ const _: () = assert!(CHUNK_MULTIPLE % matrix_units::DEPTH == 0 && CHUNK_MULTIPL
 /// Entries of a result beyond which its tiles keep a GPU busy anyway, and adding up chunks would need more groups along a
 /// dimension than the graphics APIs grant (65,535, for 32 entries each).
 const LARGEST_CHUNKED: usize = 32 * 65_535;
-/// Units of a group, of either kernel.
-const UNITS: usize = 256;
-/// Rows and columns of the result that one group computes.
-const TILE: usize = 128;
 
 /// `lhs·rhs`, from matrices in memory as they are or transposed; other views are copied first.
 ///
@@ -71,7 +68,7 @@ pub(in crate::ops) fn product(lhs: GpuTensor, rhs: GpuTensor) -> GpuTensor {
             Transposed { lhs: lhs.transposed, rhs: rhs.transposed },
         );
     }
-    let sum = super::column_sums::total(output).tensor;
+    let sum = total(output).tensor;
     GpuTensor::new_contiguous(
         sum.client,
         sum.device,

@@ -3,8 +3,7 @@
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::factor::Transposed;
-use super::{TILE, UNITS};
+use super::factor::{TILE, Transposed, UNITS};
 
 /// Terms of the sum that a tile holds.
 pub(super) const DEPTH: usize = 16;
