@@ -12,59 +12,23 @@ use super::tensors::Tensors;
 mod backward;
 mod forward;
 
-/// A block of width C on V vertices with k eigenpairs: what it is applied to, and its parameters.
-pub struct DiffusionMlpArguments {
-    /// Features x `[V,C]`.
-    pub features: Tensor<2>,
-    /// Gradients of the eigenvectors along both axes, one below the other `[2V,k]`; a constant.
-    pub gradient_basis: Tensor<2>,
-    /// Eigenvectors Φ `[V,k]`; a constant.
-    pub basis: Tensor<2>,
-    /// Coefficients c after diffusion, and c times the real and imaginary part of the mixing matrix, `[k,C]` each.
-    pub coefficients: [Tensor<2>; 3],
-    /// Coefficients of the diffused features' part of the first layer `[k,C]`.
-    pub diffused: Tensor<2>,
-    /// First layer, part that acts on the gradient features `[C,C]`.
-    pub gradient_weight: Tensor<2>,
-    /// First layer, part that acts on the features `[C,C]`.
-    pub input_weight: Tensor<2>,
-    /// Bias of the first layer `[1,C]`.
-    pub bias: Tensor<2>,
-    /// Second hidden layer `[C,C]`, `[1,C]`.
-    pub hidden: [Tensor<2>; 2],
-    /// Output layer `[C,C]`, `[1,C]`.
-    pub output: [Tensor<2>; 2],
-}
-
-/// `x + MLP(x, Φ·diffused, gradient features)` `[V,C]`, where the tensors [lie in host memory](super::lies_on_host).
+/// `x + MLP(x, Φ·diffused, gradient features)` `[V,C]` of a block of width C on V vertices with k eigenpairs, where the tensors
+/// [lie in host memory](super::lies_on_host).
 ///
-/// With `x0 x1 x2` and `y0 y1 y2` for the three `coefficients` expanded to both axes, the gradient features are
-/// `tanh(x0 (x1 − y2) + y0 (y1 + x2))`.
-pub fn diffusion_mlp(arguments: DiffusionMlpArguments) -> Tensor<2> {
-    let a = arguments;
-    let [coefficients, real, imaginary] = a.coefficients;
-    let [hidden_weight, hidden_bias] = a.hidden;
-    let [output_weight, output_bias] = a.output;
-    let arguments = [
-        a.features,
-        a.gradient_basis,
-        a.basis,
-        coefficients,
-        real,
-        imaginary,
-        a.diffused,
-        a.gradient_weight,
-        a.input_weight,
-        a.bias,
-        hidden_weight,
-        hidden_bias,
-        output_weight,
-        output_bias,
-    ];
+/// With `x0 x1 x2` and `y0 y1 y2` for three coefficients expanded to both axes, the gradient features are
+/// `tanh(x0 (x1 − y2) + y0 (y1 + x2))`. Arguments:
+///
+/// - features x `[V,C]`;
+/// - gradients of the eigenvectors along both axes, one below the other `[2V,k]`, and the eigenvectors Φ `[V,k]`: constants;
+/// - coefficients c after diffusion, and c times the real and times the imaginary part of the mixing matrix, `[k,C]` each;
+/// - coefficients of the diffused features' part of the first layer `[k,C]`;
+/// - weights of the first layer that act on the gradient features and on the features, `[C,C]` each, and its bias `[1,C]`;
+/// - weight `[C,C]` and bias `[1,C]` of the second hidden layer, and of the output layer.
+pub fn diffusion_mlp(arguments: [Tensor<2>; 14]) -> Tensor<2> {
     apply(DiffusionMlp { recorded: false }, arguments)
 }
 
-/// Arguments in the order of [`DiffusionMlpArguments`].
+/// Arguments of [`diffusion_mlp`].
 #[derive(Clone, Debug)]
 struct DiffusionMlp {
     /// Whether what the backward pass reads is a result too.

@@ -12,7 +12,7 @@ use crate::packing::Packing;
 /// only, too often; more would not fit the second level.
 const ROWS_PER_BLOCK: usize = 192;
 /// Blocks have a multiple of so many rows: whole tiles of every instruction set.
-const ROW_STEP: usize = 12;
+const BLOCK_ROW_STEP: usize = 12;
 /// Blocks per part of a sum at least: a part takes as much memory as the sum.
 const BLOCKS_PER_PART: usize = 4;
 /// Parts at most; a power of two, so that as many threads have equal shares.
@@ -22,7 +22,7 @@ const MAX_PARTS: usize = 8;
 pub(super) fn row_blocks(packing: &Packing) -> Vec<Chunk> {
     let of_garment = |(garment, rows): (usize, Range<usize>)| {
         let (count, end) = (rows.len().div_ceil(ROWS_PER_BLOCK).max(1), rows.end);
-        let step = rows.len().div_ceil(count).next_multiple_of(ROW_STEP).max(ROW_STEP);
+        let step = rows.len().div_ceil(count).next_multiple_of(BLOCK_ROW_STEP).max(BLOCK_ROW_STEP);
         rows.step_by(step).map(move |start| Chunk { garment, rows: start..(start + step).min(end) })
     };
     packing.ranges().enumerate().flat_map(of_garment).collect()
@@ -77,11 +77,11 @@ pub(super) fn map_lanes<const I: usize, const O: usize>(
     mut outputs: [&mut [f32]; O],
     function: impl Fn([f32; I], [f32; O]) -> [f32; O],
 ) {
-    const LANES: usize = 16;
+    const MAP_LANES: usize = 16;
     let count = outputs[0].len();
-    let whole = count / LANES * LANES;
-    for at in (0..whole).step_by(LANES) {
-        map_array::<I, O, LANES>(&inputs, &mut outputs, at, &function);
+    let whole = count / MAP_LANES * MAP_LANES;
+    for at in (0..whole).step_by(MAP_LANES) {
+        map_array::<I, O, MAP_LANES>(&inputs, &mut outputs, at, &function);
     }
     for at in whole..count {
         map_array::<I, O, 1>(&inputs, &mut outputs, at, &function);

@@ -20,7 +20,7 @@ struct LeftFactor {
 }
 
 impl LeftFactor {
-    fn from_row(self, row: usize) -> Self {
+    fn rows_from(self, row: usize) -> Self {
         Self { first: self.first.wrapping_add(row * self.row_stride), ..self }
     }
 }
@@ -269,17 +269,17 @@ unsafe fn strip<S: Simd, const R: usize, const V: usize, const TURNED: bool>(
     // SAFETY: rows below `rows`.
     unsafe {
         while row + R <= rows {
-            let (lhs, output) = (lhs.from_row(row), output.from(row, 0));
+            let (lhs, output) = (lhs.rows_from(row), output.from(row, 0));
             tile::<S, R, V, TURNED>(simd, lhs, rhs, inner, output, columns, add);
             row += R;
         }
         while row + 4 <= rows {
-            let (lhs, output) = (lhs.from_row(row), output.from(row, 0));
+            let (lhs, output) = (lhs.rows_from(row), output.from(row, 0));
             tile::<S, 4, V, TURNED>(simd, lhs, rhs, inner, output, columns, add);
             row += 4;
         }
         while row < rows {
-            let (lhs, output) = (lhs.from_row(row), output.from(row, 0));
+            let (lhs, output) = (lhs.rows_from(row), output.from(row, 0));
             tile::<S, 1, V, TURNED>(simd, lhs, rhs, inner, output, columns, add);
             row += 1;
         }

@@ -5,7 +5,9 @@ use burn::backend::ops::FloatTensorOps;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::column_sums::{BLOCK, ROW_STEP, blocks, column, end_row, first_row, total, total_of, write_block};
+use super::column_sums::{
+    ROWS_PER_SUM, UNIT_ROW_STEP, blocks, column, end_row, first_row, total, total_of, write_block,
+};
 use super::math::{gelu_derivative, normal_distribution};
 use super::matrix::{GpuTensor, Matrix, groups};
 use crate::ops::activation::Activation;
@@ -157,7 +159,7 @@ fn backward<N: Size>(
             let value = gradient[i] * slope::<N>(sum, form.activation);
             output[i] = value;
             total += value;
-            row += ROW_STEP;
+            row += UNIT_ROW_STEP;
         }
     }
     write_block::<N>(total, partial, vectors);
@@ -189,7 +191,7 @@ pub(in crate::ops) fn activated_sum_gradients(
         ActivationForm { activation, second: matrices.len() > 1, residual: false, rows: rows.is_some() };
     let mut of_rows = Vec::with_capacity(packing.count());
     for (garment, range) in packing.ranges().enumerate() {
-        let partial = gradient.empty(range.len().div_ceil(BLOCK), gradient.columns);
+        let partial = gradient.empty(range.len().div_ceil(ROWS_PER_SUM), gradient.columns);
         let (count, dim) = blocks(range.len(), vectors);
         // SAFETY: units beyond the last column or row of the garment do nothing.
         unsafe {

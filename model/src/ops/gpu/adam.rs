@@ -1,10 +1,9 @@
 //! One Adam update.
 
-use burn::backend::TensorMetadata;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::matrix::{GpuTensor, Matrix, empty, groups};
+use super::matrix::{GpuTensor, Matrix, groups};
 
 #[cube(launch_unchecked)]
 fn update(
@@ -39,13 +38,10 @@ pub(in crate::ops) fn adam(
     step_size: f32,
     epsilon: f32,
 ) -> [GpuTensor; 3] {
-    let shape = arguments[0].shape();
     let [parameter, gradient, first, second] = arguments.map(Matrix::new);
     parameter.assert_like([&gradient, &first, &second]);
-    let count = shape.num_elements();
-    let results = [(); 3].map(|()| empty(&parameter.tensor, shape.clone()));
-    let outputs = results.clone().map(Matrix::new);
-    let (groups, dim) = groups(parameter.client(), count);
+    let outputs = [(); 3].map(|()| parameter.like());
+    let (groups, dim) = groups(parameter.client(), parameter.count());
     // SAFETY: units beyond the last entry do nothing.
     unsafe {
         update::launch_unchecked(
@@ -59,12 +55,12 @@ pub(in crate::ops) fn adam(
             outputs[0].argument(1),
             outputs[1].argument(1),
             outputs[2].argument(1),
-            count,
+            parameter.count(),
             beta_1,
             beta_2,
             step_size,
             epsilon,
         );
     }
-    results
+    outputs.map(|output| output.tensor)
 }

@@ -1,12 +1,11 @@
 //! Weighted mean of a parameter and its running average.
 
-use burn::backend::{Cube, TensorMetadata};
+use burn::backend::Cube;
 use burn::tensor::Tensor;
 use burn_cubecl::cubecl;
-use burn_cubecl::kernel::into_contiguous;
 use cubecl::prelude::*;
 
-use super::matrix::{buffer, empty, groups};
+use super::matrix::{Matrix, groups};
 use crate::ops::operation::{TensorKernel, run};
 use crate::ops::tensors::Tensors;
 
@@ -31,26 +30,24 @@ struct WeightedMean {
 
 impl TensorKernel for WeightedMean {
     fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
-        let [old, new] = arguments.take();
-        let shape = old.shape();
-        let [old, new] = [old, new].map(into_contiguous);
-        let output = empty(&old, shape.clone());
-        let count = shape.num_elements();
-        let (groups, dim) = groups(&old.client, count);
+        let [old, new] = arguments.take().map(Matrix::new);
+        old.assert_like([&new]);
+        let output = old.like();
+        let (groups, dim) = groups(old.client(), old.count());
         // SAFETY: units beyond the last entry do nothing.
         unsafe {
             weighted_mean::launch_unchecked(
-                &old.client,
+                old.client(),
                 groups,
                 dim,
-                buffer(&old, count, 1),
-                buffer(&new, count, 1),
-                buffer(&output, count, 1),
-                count,
+                old.argument(1),
+                new.argument(1),
+                output.argument(1),
+                old.count(),
                 self.decay as f32,
                 (1.0 - self.decay) as f32,
             );
         }
-        [output].into()
+        [output.tensor].into()
     }
 }

@@ -50,6 +50,16 @@ impl Matrix {
         Self { tensor, rows, columns }
     }
 
+    /// Uninitialised memory for a tensor of the same shape.
+    pub(super) fn like(&self) -> Self {
+        Self { tensor: empty(&self.tensor, self.tensor.shape()), ..*self }
+    }
+
+    /// Entries.
+    pub(super) fn count(&self) -> usize {
+        self.rows * self.columns
+    }
+
     /// Entries that a kernel reads at once.
     pub(super) fn width(&self) -> usize {
         if self.columns.is_multiple_of(4) { 4 } else { 1 }
@@ -61,7 +71,7 @@ impl Matrix {
 
     /// The whole matrix as an argument of a kernel.
     pub(super) fn argument(&self, width: usize) -> BufferArg {
-        buffer(&self.tensor, self.rows * self.columns, width)
+        buffer(&self.tensor, self.count(), width)
     }
 }
 

@@ -5,7 +5,9 @@ use burn::tensor::Tensor;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::column_sums::{BLOCK, ROW_STEP, blocks, column, end_row, first_row, total, write_block};
+use super::column_sums::{
+    ROWS_PER_SUM, UNIT_ROW_STEP, blocks, column, end_row, first_row, total, write_block,
+};
 use super::math::sin_cos;
 use super::matrix::{GpuTensor, Matrix, groups};
 use crate::ops::operation::{Operation, Saves, TensorKernel, apply};
@@ -112,7 +114,7 @@ fn backward<N: Size>(
             of_gate[i] = sine * gradient[i];
             of_input[i] = inner;
             sum += inner;
-            row += ROW_STEP;
+            row += UNIT_ROW_STEP;
         }
     }
     write_block::<N>(sum, partial, vectors);
@@ -125,7 +127,7 @@ fn gradients(arguments: [GpuTensor; 4], omega: f64) -> [GpuTensor; 3] {
     bias.assert_size(1, input.columns);
     let (rows, columns, width) = (input.rows, input.columns, input.width());
     let [of_input, of_gate] = [(); 2].map(|()| input.empty(rows, columns));
-    let partial = input.empty(rows.div_ceil(BLOCK), columns);
+    let partial = input.empty(rows.div_ceil(ROWS_PER_SUM), columns);
     let (count, dim) = blocks(rows, columns / width);
     // SAFETY: units beyond the last column or row do nothing.
     unsafe {

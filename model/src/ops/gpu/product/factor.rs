@@ -7,7 +7,7 @@ use cubecl::prelude::*;
 use crate::ops::gpu::matrix::{GpuTensor, Matrix};
 
 /// Units of a group, of either kernel.
-pub(super) const UNITS: usize = 256;
+pub(super) const PRODUCT_UNITS: usize = 256;
 /// Rows and columns of the result that one group computes.
 pub(super) const TILE: usize = 128;
 

@@ -12,7 +12,7 @@ use cubecl::prelude::*;
 
 use super::column_sums::total;
 use super::matrix::GpuTensor;
-use factor::{Factor, Sizes, TILE, Transposed, UNITS};
+use factor::{Factor, PRODUCT_UNITS, Sizes, TILE, Transposed};
 
 /// Groups that keep a large GPU busy: two on each of its 132 multiprocessors.
 const ENOUGH_GROUPS: usize = 264;
@@ -20,7 +20,8 @@ const ENOUGH_GROUPS: usize = 264;
 const SMALLEST_CHUNK: usize = 128;
 /// Both kernels' tiles divide it.
 const CHUNK_MULTIPLE: usize = 32;
-const _: () = assert!(CHUNK_MULTIPLE % matrix_units::DEPTH == 0 && CHUNK_MULTIPLE % plain::DEPTH == 0);
+const _: () =
+    assert!(CHUNK_MULTIPLE % matrix_units::CMMA_DEPTH == 0 && CHUNK_MULTIPLE % plain::PLAIN_DEPTH == 0);
 /// Entries of a result beyond which its tiles keep a GPU busy anyway, and adding up chunks would need more groups along a
 /// dimension than the graphics APIs grant (65,535, for 32 entries each).
 const LARGEST_CHUNKED: usize = 32 * 65_535;
@@ -56,7 +57,7 @@ pub(in crate::ops) fn product(lhs: GpuTensor, rhs: GpuTensor) -> GpuTensor {
         multiply(
             output.client(),
             groups,
-            CubeDim::new_1d(UNITS as u32),
+            CubeDim::new_1d(PRODUCT_UNITS as u32),
             width,
             lhs.matrix.argument(width),
             rhs.matrix.argument(width),
