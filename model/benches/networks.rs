@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use burn::module::Module;
 use burn::tensor::{Device, Distribution, Tensor};
-use clothcombo_model::ops::{Activation, activate_residual, product, sine_modulation};
+use clothcombo_model::ops::{Activation, activate_residual, product};
 use clothcombo_model::{
     BodyTensors, ClothCombo, Dimensions, GarmentArrays, GarmentTensors, Mode, ModelConfig, OutfitTensors,
 };
@@ -122,14 +122,6 @@ fn operations(criterion: &mut Criterion) {
         let mut time = |name: &str, operation: &dyn Fn() -> Tensor<2>| {
             group.bench_function(name, |bencher| bencher.iter(|| operation().sum().backward()));
         };
-        time("sine modulation, fused", &|| {
-            let (input, bias, gate) = arguments();
-            sine_modulation(input, bias, gate, 1.0)
-        });
-        time("sine modulation, composed", &|| {
-            let (input, bias, gate) = arguments();
-            (input + bias).sin() * gate
-        });
         time("gelu, fused", &|| {
             let (input, bias, gate) = arguments();
             activate_residual(Activation::Gelu, input, bias, gate)

@@ -2,7 +2,7 @@
 //!
 //! Every part runs in a `tracing` span of its own name, which costs nothing until someone listens.
 
-use burn::module::{Module, ModuleMapper, Param};
+use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use tracing::trace_span;
 
@@ -128,21 +128,12 @@ impl ClothCombo {
     /// bound would need as many steps to come back.
     pub fn clamp_diffusion_times(mut self) -> Self {
         for block in &mut self.garment_encoder.diffusion_net.blocks {
-            let time = block.diffusion.time.clone();
-            block.diffusion.time = ClampTimes.map_float(time);
+            block.diffusion.time = block.diffusion.time.clone().map(|time| {
+                let tracked = time.is_require_grad();
+                let clamped = time.inner().clamp_min(MINIMUM_TIME);
+                if tracked { Tensor::from_inner(clamped).require_grad() } else { clamped }
+            });
         }
         self
-    }
-}
-
-struct ClampTimes;
-
-impl ModuleMapper for ClampTimes {
-    fn map_float<const D: usize>(&mut self, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let (id, value, mapper) = parameter.consume();
-        let tracked = value.is_require_grad();
-        let clamped = value.inner().clamp_min(MINIMUM_TIME);
-        let clamped = if tracked { Tensor::from_inner(clamped).require_grad() } else { clamped };
-        Param::from_mapped_value(id, clamped, mapper)
     }
 }

@@ -54,19 +54,6 @@ pub enum ModelError {
     },
 }
 
-/// Checks the length of an array.
-pub(crate) fn check_length(
-    array: &'static str,
-    found: usize,
-    expected: usize,
-    layout: &'static str,
-) -> Result<(), ModelError> {
-    match found == expected {
-        true => Ok(()),
-        false => Err(ModelError::Length { array, expected, found, layout }),
-    }
-}
-
 /// Checks length and finiteness of a flat array.
 pub(crate) fn check_array(
     array: &'static str,
@@ -74,8 +61,10 @@ pub(crate) fn check_array(
     expected: usize,
     layout: &'static str,
 ) -> Result<(), ModelError> {
-    check_length(array, values.len(), expected, layout)?;
-    check_finite(array, values)
+    match values.len() {
+        found if found == expected => check_finite(array, values),
+        found => Err(ModelError::Length { array, expected, found, layout }),
+    }
 }
 
 /// Checks that all elements are finite.

@@ -30,17 +30,17 @@ pub fn clip_global_norm<M: Module>(
 
 /// Euclidean norm `[1]` of all gradients of `module`, `None` if there is none.
 fn global_norm<M: Module>(module: &M, gradients: &GradientsParams) -> Option<Tensor<1>> {
-    let mut all = Collect { gradients, found: Vec::new() };
+    let mut all = CollectGradients { gradients, found: Vec::new() };
     module.visit(&mut all);
     (!all.found.is_empty()).then(|| squared_norm(all.found).sqrt())
 }
 
-struct Collect<'a> {
+struct CollectGradients<'a> {
     gradients: &'a GradientsParams,
     found: Vec<DispatchTensor>,
 }
 
-impl ModuleVisitor for Collect<'_> {
+impl ModuleVisitor for CollectGradients<'_> {
     fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
         if let Some(gradient) = self.gradients.get::<D>(parameter.id) {
             self.found.push(gradient.into_dispatch());

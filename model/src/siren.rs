@@ -18,7 +18,7 @@ use crate::config::ModelConfig;
 use crate::initializer::{Initializer, fan_in_bound};
 use crate::linear::Linear;
 use crate::ops::{
-    Activation, SirenArguments, activate_packed, activate_packed_sum, modulated_siren, product, runs_on_host,
+    Activation, activate_packed, activate_packed_sum, lies_on_host, modulated_siren, product,
     sine_modulation, split_columns,
 };
 use crate::packing::Packing;
@@ -174,34 +174,21 @@ impl ModulatedSiren {
     ) -> Tensor<2> {
         let rows = self.modulator.rows(garment);
         // A single layer has no weights between layers to hand over.
-        if self.sine.len() > 1 && runs_on_host(&coordinates) {
-            return self.fused(coordinates, vertex_product, rows, packing);
+        if self.sine.len() == 1 || !lies_on_host(&coordinates) {
+            return self.layer_by_layer(coordinates, vertex_product, rows, packing);
         }
-        self.layer_by_layer(coordinates, vertex_product, rows, packing)
-    }
-
-    /// All layers as one operation of the host.
-    fn fused(
-        &self,
-        coordinates: Tensor<2>,
-        vertex_product: Tensor<2>,
-        rows: Tensor<2>,
-        packing: &Packing,
-    ) -> Tensor<2> {
-        let (first, hidden) = self.sine.split_first().expect("a sine layer");
-        let arguments = SirenArguments {
+        let arguments = [
             coordinates,
             vertex_product,
             rows,
-            gate_weights: Tensor::cat(self.modulator.hidden.iter().map(Param::val).collect(), 0),
-            first_weight: first.weight.val(),
-            sine_weights: Tensor::cat(hidden.iter().map(|layer| layer.weight.val()).collect(), 0),
-            sine_biases: Tensor::cat(self.sine.iter().map(Linear::bias_row).collect(), 1),
-            output_weight: self.output.weight.val(),
-            output_bias: self.output.bias_row(),
-        };
-        let omegas = [self.omega_first, self.omega_hidden];
-        modulated_siren(arguments, omegas, packing)
+            Tensor::cat(self.modulator.hidden.iter().map(Param::val).collect(), 0),
+            self.sine[0].weight.val(),
+            Tensor::cat(self.sine[1..].iter().map(|layer| layer.weight.val()).collect(), 0),
+            Tensor::cat(self.sine.iter().map(Linear::bias_row).collect(), 1),
+            self.output.weight.val(),
+            self.output.bias_row(),
+        ];
+        modulated_siren(arguments, [self.omega_first, self.omega_hidden], packing)
     }
 
     /// Every layer as operations of its own: what GPUs run, and the oracle of the fused form.

@@ -43,7 +43,7 @@ impl Untangling {
 
     /// Whether any garment of `outfit` is displaced: always in the full graph, else if two garments can touch.
     pub fn acts_on(&self, outfit: &OutfitTensors) -> bool {
-        self.graph == Graph::Full || outfit.has_contacts()
+        self.graph == Graph::Full || outfit.edges.is_some()
     }
 
     /// Displacements Δx_m `[ΣV,3]` (m).

@@ -3,22 +3,14 @@
 use crate::call::refused_text;
 use clothcombo_data::format::PolygonMesh;
 use clothcombo_physics::mesh::{MeshError, TriMesh};
+use clothcombo_physics::transform::Transform;
 use clothcombo_trainer::score::NamedMesh;
 use miette::{IntoDiagnostic, Report};
 use numpy::ndarray::{Array2, Array3};
-use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyAny;
 use std::path::PathBuf;
-
-/// A mesh file, or positions `[V, 3]` and faces `[F, 3]` or `[F, 4]`.
-#[derive(FromPyObject)]
-pub enum MeshInput<'py> {
-    /// A file.
-    File(PathBuf),
-    /// A mesh in memory.
-    Arrays(PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, u32>),
-}
 
 /// The rows of a C-contiguous `[V, 3]` array, in place.
 pub fn rows<'a, T: Element + Copy>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<&'a [[T; 3]]> {
@@ -28,65 +20,66 @@ pub fn rows<'a, T: Element + Copy>(array: &'a PyReadonlyArray2<'_, T>) -> PyResu
     }
 }
 
-/// The frames of a C-contiguous `[T, J, 3]` array.
-pub fn frames(array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Vec<[f64; 3]>>> {
-    match (array.as_array().dim(), array.as_slice()) {
-        ((_, joints, 3), Ok(values)) if joints > 0 => {
-            Ok(values.as_chunks().0.chunks_exact(joints).map(<[_]>::to_vec).collect())
+/// A copy of a `[V, 3]` array.
+pub struct CopiedRows(pub Vec<[f64; 3]>);
+
+impl FromPyObject<'_, '_> for CopiedRows {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
+        Ok(Self(rows(&given.extract::<PyReadonlyArray2<'_, f64>>()?)?.to_vec()))
+    }
+}
+
+/// A copy of a mesh file's path, or of positions `[V, 3]` and faces `[F, 3]` or `[F, 4]`.
+pub enum MeshInput {
+    /// A file.
+    File(PathBuf),
+    /// A mesh in memory.
+    Polygons(Result<PolygonMesh, MeshError>),
+}
+
+impl FromPyObject<'_, '_> for MeshInput {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
+        if let Ok(path) = given.extract() {
+            return Ok(Self::File(path));
         }
-        _ => Err(refused_text("the poses of a motion have the shape [T, J, 3]")),
+        let (CopiedRows(positions), faces): (_, PyReadonlyArray2<'_, u32>) = given.extract()?;
+        let corners = faces.as_array().ncols();
+        match (corners, faces.as_slice()) {
+            (3 | 4, Ok(values)) => Ok(Self::Polygons(PolygonMesh::from_faces(positions, values, corners))),
+            _ => Err(refused_text("faces have the shape [F, 3] or [F, 4]")),
+        }
     }
 }
 
-/// The mesh of two arrays.
-pub fn polygons(
-    positions: &PyReadonlyArray2<'_, f64>,
-    faces: &PyReadonlyArray2<'_, u32>,
-) -> PyResult<Result<PolygonMesh, MeshError>> {
-    let corners = faces.as_array().ncols();
-    match (corners, faces.as_slice()) {
-        (3 | 4, Ok(values)) => Ok(PolygonMesh::from_faces(rows(positions)?.to_vec(), values, corners)),
-        _ => Err(refused_text("faces have the shape [F, 3] or [F, 4]")),
-    }
-}
-
-impl MeshInput<'_> {
+impl MeshInput {
     /// What is read.
     pub fn file(&self) -> Option<PathBuf> {
         match self {
             Self::File(path) => Some(path.clone()),
-            Self::Arrays(..) => None,
+            Self::Polygons(_) => None,
         }
     }
 
-    /// A copy that does not belong to Python; messages call a mesh in memory `name`.
-    pub fn taken(&self, name: &str) -> PyResult<TakenMesh> {
-        Ok(match self {
-            Self::File(path) => TakenMesh::File(path.clone()),
-            Self::Arrays(positions, faces) => TakenMesh::Polygons(name.into(), polygons(positions, faces)?),
-        })
-    }
-}
-
-/// A mesh that does not belong to Python.
-pub enum TakenMesh {
-    /// A file.
-    File(PathBuf),
-    /// A mesh of that name.
-    Polygons(PathBuf, Result<PolygonMesh, MeshError>),
-}
-
-impl TakenMesh {
-    /// As triangles.
-    pub fn triangles(self) -> Result<NamedMesh, Report> {
+    /// As triangles; messages call a mesh in memory `name`.
+    pub fn triangles(self, name: &str) -> Result<NamedMesh, Report> {
         match self {
             Self::File(path) => Ok(NamedMesh::load(&path)?),
-            Self::Polygons(path, mesh) => {
-                let mesh = named(&path.display().to_string(), mesh)?.to_tri_mesh(&path).into_diagnostic()?;
+            Self::Polygons(mesh) => {
+                let path = PathBuf::from(name);
+                let mesh = named(name, mesh)?.to_tri_mesh(&path).into_diagnostic()?;
                 Ok(NamedMesh { path, mesh })
             }
         }
     }
+}
+
+/// Meshes as triangles; messages call those in memory `what` and their number.
+pub fn triangles(what: &str, meshes: Vec<MeshInput>) -> Result<Vec<NamedMesh>, Report> {
+    meshes.into_iter().enumerate().map(|(i, mesh)| mesh.triangles(&format!("{what} {i}"))).collect()
 }
 
 /// `result` with the name of the mesh in its error.
@@ -105,6 +98,21 @@ pub fn array<T: Element, const N: usize>(py: Python<'_>, rows: Vec<[T; N]>) -> B
     let array = Array2::from_shape_vec((count, N), rows.into_flattened());
     array.expect("a vector of rows has as many entries as its shape says").into_pyarray(py)
 }
+
+/// Transforms as an array `[V, 12]`.
+pub fn array_of_transforms<'py>(py: Python<'py>, transforms: &[Transform]) -> Bound<'py, PyArray2<f64>> {
+    let values = transforms.as_flattened().as_flattened().to_vec();
+    let array = Array2::from_shape_vec((transforms.len(), 12), values);
+    array.expect("a transform has twelve entries").into_pyarray(py)
+}
+
+/// Positions and faces of a mesh, `[V, 3]` and `[F, 3]`.
+pub fn arrays_of_mesh<'py>(py: Python<'py>, mesh: &TriMesh) -> ArraysOfMesh<'py> {
+    (array(py, mesh.positions().to_vec()), array(py, mesh.faces().to_vec()))
+}
+
+/// Positions and faces.
+pub type ArraysOfMesh<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>);
 
 /// Frames of `[V, 3]` each as an array `[T, V, 3]`.
 pub fn array_of_frames(py: Python<'_>, frames: Vec<Vec<[f64; 3]>>) -> Bound<'_, PyArray3<f64>> {

@@ -1,49 +1,45 @@
 //! A parametric body.
 
-use crate::arrays::{array, from_json, rows};
-use crate::call::{call, refused_text};
-use clothcombo_data::asset::{Body as BodyModel, Pose};
+use crate::arrays::{CopiedRows, array, array_of_transforms, from_json};
+use crate::call::{call, refused, refused_text};
+use clothcombo_data::asset::{Body, Pose};
 use clothcombo_trainer::dataset::load_body;
 use clothcombo_trainer::inference::read_pose;
 use miette::IntoDiagnostic;
-use numpy::{PyArray2, PyReadonlyArray2};
+use numpy::PyArray2;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// A parametric body: shape and pose in, vertices out.
-#[pyclass(frozen, module = "clothcombo._native")]
-pub struct Body {
-    pub model: Arc<BodyModel>,
+#[pyclass(frozen, name = "Body", module = "clothcombo._native")]
+pub struct PyBody {
+    pub model: Arc<Body>,
 }
 
-/// A pose by name or frame of a file, or its rotations `[J, 3]`.
-#[derive(FromPyObject)]
-pub enum PoseInput<'py> {
-    /// A name, FILE.npz or FILE.npz:FRAME.
-    Named(String),
-    /// Rotation vectors (radians).
-    Rotations(PyReadonlyArray2<'py, f64>),
+/// A pose by name or frame of a file, or its rotations `[J, 3]` (radians); and what a report calls it.
+pub struct NamedPose {
+    pub pose: Pose,
+    pub name: String,
 }
 
-impl PoseInput<'_> {
-    /// The pose, and what a report calls it.
-    pub fn pose(&self) -> PyResult<(Pose, String)> {
-        Ok(match self {
-            Self::Named(text) => (read_pose(text).map_err(crate::call::refused)?, text.clone()),
-            Self::Rotations(rotations) => {
-                let rotations = rows(rotations)?.to_vec();
-                if rotations.as_flattened().iter().any(|x| !x.is_finite()) {
-                    return Err(refused_text("the pose holds a number that is not finite"));
-                }
-                (Pose { rotations }, "given rotations".to_owned())
-            }
-        })
+impl FromPyObject<'_, '_> for NamedPose {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
+        if let Ok(name) = given.extract::<String>() {
+            return Ok(Self { pose: read_pose(&name).map_err(refused)?, name });
+        }
+        let CopiedRows(rotations) = given.extract()?;
+        if rotations.as_flattened().iter().any(|x| !x.is_finite()) {
+            return Err(refused_text("the pose holds a number that is not finite"));
+        }
+        Ok(Self { pose: Pose { rotations }, name: "given rotations".to_owned() })
     }
 }
 
 #[pymethods]
-impl Body {
+impl PyBody {
     /// "mannequin", or a body npz.
     #[staticmethod]
     fn load(py: Python<'_>, name: String) -> PyResult<Self> {
@@ -82,16 +78,14 @@ impl Body {
         &self,
         py: Python<'py>,
         shape: Vec<f64>,
-        pose: PoseInput<'_>,
+        pose: NamedPose,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
         if shape.iter().any(|x| !x.is_finite()) {
             return Err(refused_text("the shape holds a number that is not finite"));
         }
-        let (pose, _) = pose.pose()?;
-        let posed = call(py, &[], || self.model.posed(&shape, &pose).into_diagnostic())?;
-        let bones: Vec<[f64; 12]> =
-            posed.bones.iter().map(|bone| std::array::from_fn(|i| bone[i / 4][i % 4])).collect();
-        Ok((array(py, posed.positions), array(py, posed.joints), array(py, bones)))
+        let posed = call(py, &[], || self.model.posed(&shape, &pose.pose).into_diagnostic())?;
+        let bones = array_of_transforms(py, &posed.bones);
+        Ok((array(py, posed.positions), array(py, posed.joints), bones))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

@@ -1,11 +1,11 @@
 //! What a drape made.
 
-use crate::arrays::{array, array_of_frames, from_json};
+use crate::arrays::{ArraysOfMesh, array, array_of_frames, array_of_transforms, arrays_of_mesh, from_json};
 use crate::call::{call, refused_text};
 use clothcombo_physics::contact::resolve::Certificate;
 use clothcombo_trainer::inference::output::{Show, Staged, write};
 use clothcombo_trainer::inference::{
-    Bodies, Drape as FrameDrape, DrapeReport, Draper, GarmentDrape, Outfit, OutfitGarment, Smoothing,
+    Bodies, Drape, DrapeReport, Draper, GarmentDrape, Outfit, OutfitGarment, Smoothing,
 };
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
@@ -13,16 +13,16 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// An outfit on one body, or on the frames of a motion.
-#[pyclass(frozen, module = "clothcombo._native")]
-pub struct Drape {
+#[pyclass(frozen, name = "Drape", module = "clothcombo._native")]
+pub struct PyDrape {
     pub draper: Draper,
     pub outfit: Arc<Outfit>,
-    pub drapes: Vec<FrameDrape>,
+    pub drapes: Vec<Drape>,
     pub bodies: Bodies,
     pub smoothing: Option<Smoothing>,
 }
 
-impl Drape {
+impl PyDrape {
     fn garment(&self, index: usize) -> PyResult<&OutfitGarment> {
         let none = || refused_text(format!("no garment {index} of {}", self.outfit.garments.len()));
         self.outfit.garments.get(index).ok_or_else(none)
@@ -35,7 +35,7 @@ impl Drape {
 }
 
 #[pymethods]
-impl Drape {
+impl PyDrape {
     #[getter]
     fn names(&self) -> Vec<String> {
         self.outfit.names().map(str::to_owned).collect()
@@ -75,13 +75,8 @@ impl Drape {
     }
 
     /// The mesh that was draped: rest [V, 3] and faces [F, 3].
-    fn mesh<'py>(
-        &self,
-        py: Python<'py>,
-        index: usize,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>)> {
-        let rest = &self.garment(index)?.prepared.garment.rest;
-        Ok((array(py, rest.positions().to_vec()), array(py, rest.faces().to_vec())))
+    fn mesh<'py>(&self, py: Python<'py>, index: usize) -> PyResult<ArraysOfMesh<'py>> {
+        Ok(arrays_of_mesh(py, &self.garment(index)?.prepared.garment.rest))
     }
 
     /// Where the vertices of that mesh are at one stage [T, V, 3] (m).
@@ -98,9 +93,7 @@ impl Drape {
     /// Skinning of every vertex of that mesh, canonical → posed, in the first frame [V, 12].
     fn transforms<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.garment(index)?;
-        let transforms = &self.drapes[0].garments[index].transforms;
-        let rows = transforms.iter().map(|t| std::array::from_fn::<_, 12, _>(|i| t[i / 4][i % 4]));
-        Ok(array(py, rows.collect()))
+        Ok(array_of_transforms(py, &self.drapes[0].garments[index].transforms))
     }
 
     /// Whether a garment is held, and its category.

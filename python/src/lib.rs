@@ -17,15 +17,15 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use crate::body::Body;
+    use crate::body::PyBody;
     #[pymodule_export]
-    use crate::drape::Drape;
+    use crate::drape::PyDrape;
     #[pymodule_export]
     use crate::measure::{certificate, check, fit_garment, resolve, score};
     #[pymodule_export]
-    use crate::model::{Model, Outfit};
+    use crate::model::{PyModel, PyOutfit};
     #[pymodule_export]
-    use crate::scene::{Scene, default_losses, evaluate_f32, evaluate_f64};
+    use crate::scene::{PyScene, default_losses, evaluate_f32, evaluate_f64};
     use pyo3::prelude::*;
 
     #[pymodule_init]

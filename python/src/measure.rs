@@ -1,9 +1,9 @@
 //! Meshes fitted, checked, scored, counted and resolved, from files or arrays.
 
-use crate::arrays::{MeshInput, TakenMesh, array, from_json};
-use crate::body::Body;
+use crate::arrays::{MeshInput, array, arrays_of_mesh, from_json, named, triangles};
+use crate::body::PyBody;
 use crate::call::call;
-use crate::model::{GarmentInput, WantedGarment, resolve_settings};
+use crate::model::{GarmentInput, RequestedGarment, resolve_settings};
 use clothcombo_data::check::{Checker, FileCheck, find_targets, only_body};
 use clothcombo_data::fit;
 use clothcombo_data::format::load_mesh;
@@ -13,9 +13,7 @@ use clothcombo_physics::contact::resolve::{
 };
 use clothcombo_physics::mesh::TriMesh;
 use clothcombo_trainer::dataset::load_body;
-use clothcombo_trainer::score::{
-    NamedMesh, SceneMeshes, ScoreDistance, checked_body, checked_garment, score_meshes,
-};
+use clothcombo_trainer::score::{SceneMeshes, ScoreDistance, checked_body, checked_garment, score_meshes};
 use miette::{IntoDiagnostic, Report};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -27,24 +25,23 @@ use std::path::PathBuf;
 #[pyo3(name = "fit")]
 pub fn fit_garment<'py>(
     py: Python<'py>,
-    garment: GarmentInput<'_>,
-    body: &Body,
+    garment: GarmentInput,
+    body: &PyBody,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyAny>)> {
-    let garment = WantedGarment::new(garment)?;
+    let garment = RequestedGarment::new(garment)?;
     let files: Vec<PathBuf> = garment.file().into_iter().collect();
     let fitted = call(py, &files, || {
         let (name, hints) = (garment.name.clone(), garment.hints()?);
         let mesh = match garment.mesh {
-            None => load_mesh(name.as_ref()).into_diagnostic()?,
-            Some(mesh) => crate::arrays::named(&name, mesh)?,
+            MeshInput::File(path) => load_mesh(&path).into_diagnostic()?,
+            MeshInput::Polygons(mesh) => named(&name, mesh)?,
         };
         let body = &body.model;
         let named = |error: fit::FitError| Report::msg(format!("{name} on body '{}': {error}", body.name));
         fit::fit(&mesh, body, &hints).map_err(named)
     })?;
-    let rest = &fitted.garment.rest;
-    let report = from_json(py, &fitted.report)?;
-    Ok((array(py, rest.positions().to_vec()), array(py, rest.faces().to_vec()), report))
+    let (positions, faces) = arrays_of_mesh(py, &fitted.garment.rest);
+    Ok((positions, faces, from_json(py, &fitted.report)?))
 }
 
 /// What `clothcombo check --json` prints of every file.
@@ -60,39 +57,28 @@ pub fn check(py: Python<'_>, paths: Vec<PathBuf>, body: Option<String>) -> PyRes
     from_json(py, &checked)
 }
 
-fn files<'a>(meshes: impl IntoIterator<Item = &'a MeshInput<'a>>) -> Vec<PathBuf> {
+fn files<'a>(meshes: impl IntoIterator<Item = &'a MeshInput>) -> Vec<PathBuf> {
     meshes.into_iter().filter_map(MeshInput::file).collect()
-}
-
-fn taken(what: &str, meshes: &[MeshInput<'_>]) -> PyResult<Vec<TakenMesh>> {
-    meshes.iter().enumerate().map(|(i, mesh)| mesh.taken(&format!("{what} {i}"))).collect()
-}
-
-fn triangles(meshes: Vec<TakenMesh>) -> Result<Vec<NamedMesh>, Report> {
-    meshes.into_iter().map(TakenMesh::triangles).collect()
 }
 
 /// The score of draped meshes, as `clothcombo score --json` prints it.
 #[pyfunction]
 pub fn score<'py>(
     py: Python<'py>,
-    body: MeshInput<'_>,
-    rest: Vec<MeshInput<'_>>,
-    draped: Vec<MeshInput<'_>>,
-    canonical: Vec<MeshInput<'_>>,
+    body: MeshInput,
+    rest: Vec<MeshInput>,
+    draped: Vec<MeshInput>,
+    canonical: Vec<MeshInput>,
     surface: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let files = files([&body].into_iter().chain(&rest).chain(&draped).chain(&canonical));
-    let body = body.taken("body")?;
-    let [rest, draped, canonical] =
-        [taken("rest", &rest)?, taken("garment", &draped)?, taken("canonical", &canonical)?];
     let distance = if surface { ScoreDistance::Surface } else { ScoreDistance::NearestVertex };
     let score = call(py, &files, || {
         let meshes = SceneMeshes {
-            body: body.triangles()?,
-            rest: triangles(rest)?,
-            draped: triangles(draped)?,
-            canonical: triangles(canonical)?,
+            body: body.triangles("body")?,
+            rest: triangles("rest", rest)?,
+            draped: triangles("garment", draped)?,
+            canonical: triangles("canonical", canonical)?,
         };
         score_meshes(meshes, distance)
     })?;
@@ -109,10 +95,10 @@ struct Layers {
 
 impl Layers {
     /// Without rest meshes, garments are at rest as they are.
-    fn new(body: TakenMesh, garments: Vec<TakenMesh>, rest: Vec<TakenMesh>) -> Result<Self, Report> {
-        let body = checked_body(body.triangles()?)?;
-        let draped = triangles(garments)?;
-        let rest = if rest.is_empty() { draped.clone() } else { triangles(rest)? };
+    fn new(body: MeshInput, garments: Vec<MeshInput>, rest: Vec<MeshInput>) -> Result<Self, Report> {
+        let body = checked_body(body.triangles("body")?)?;
+        let draped = triangles("garment", garments)?;
+        let rest = if rest.is_empty() { draped.clone() } else { triangles("rest", rest)? };
         if rest.len() != draped.len() {
             let (rest, draped) = (rest.len(), draped.len());
             return Err(Report::msg(format!("{rest} rest meshes but {draped} garments")));
@@ -132,36 +118,24 @@ impl Layers {
 
     fn named(&self, error: ResolveError) -> Report {
         let name = error.garment().and_then(|garment| self.names.get(garment).cloned());
-        let report = Report::msg(error.to_string());
         match name {
-            Some(name) => Report::msg(format!("{name}: {report}")),
-            None => report,
+            Some(name) => Report::msg(format!("{name}: {error}")),
+            None => Report::msg(error.to_string()),
         }
     }
-}
-
-/// The files that are read, and what reads them, of a body, garments and their rest meshes.
-fn layers(
-    body: &MeshInput<'_>,
-    garments: &[MeshInput<'_>],
-    rest: &[MeshInput<'_>],
-) -> PyResult<(Vec<PathBuf>, impl FnOnce() -> Result<Layers, Report> + Send)> {
-    let files = files([body].into_iter().chain(garments).chain(rest));
-    let (body, garments, rest) = (body.taken("body")?, taken("garment", garments)?, taken("rest", rest)?);
-    Ok((files, || Layers::new(body, garments, rest)))
 }
 
 /// Exact counts of what intersects what.
 #[pyfunction]
 pub fn certificate<'py>(
     py: Python<'py>,
-    body: MeshInput<'_>,
-    garments: Vec<MeshInput<'_>>,
-    rest: Vec<MeshInput<'_>>,
+    body: MeshInput,
+    garments: Vec<MeshInput>,
+    rest: Vec<MeshInput>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (files, read) = layers(&body, &garments, &rest)?;
+    let files = files([&body].into_iter().chain(&garments).chain(&rest));
     let found = call(py, &files, || {
-        let scene = read()?;
+        let scene = Layers::new(body, garments, rest)?;
         certify(&scene.surface, &scene.layers()).map_err(|error| scene.named(error))
     })?;
     from_json(py, &found)
@@ -171,17 +145,17 @@ pub fn certificate<'py>(
 #[pyfunction]
 pub fn resolve<'py>(
     py: Python<'py>,
-    body: MeshInput<'_>,
-    garments: Vec<MeshInput<'_>>,
-    rest: Vec<MeshInput<'_>>,
+    body: MeshInput,
+    garments: Vec<MeshInput>,
+    rest: Vec<MeshInput>,
     gap_mm: f64,
     time_limit: Option<f64>,
     keep_self: bool,
 ) -> PyResult<(Vec<Bound<'py, PyArray2<f64>>>, Bound<'py, PyAny>)> {
-    let (files, read) = layers(&body, &garments, &rest)?;
+    let files = files([&body].into_iter().chain(&garments).chain(&rest));
     let settings = ResolveSettings { self_contact: !keep_self, ..resolve_settings(gap_mm, time_limit)? };
     let resolved = call(py, &files, || {
-        let scene = read()?;
+        let scene = Layers::new(body, garments, rest)?;
         resolve_layers(&scene.surface, &scene.layers(), &settings).map_err(|error| scene.named(error))
     })?;
     let certificate = from_json(py, &resolved.certificate)?;

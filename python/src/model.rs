@@ -1,84 +1,102 @@
 //! A trained model that drapes.
 
-use crate::arrays::{frames, polygons, rows, to_value};
-use crate::body::{Body, PoseInput};
-use crate::call::{call, refused_text};
-use crate::drape::Drape;
+use crate::arrays::{CopiedRows, MeshInput, named, to_value};
+use crate::body::{NamedPose, PyBody};
+use crate::call::{call, refused, refused_text};
+use crate::drape::PyDrape;
 use clothcombo_data::asset::{KnownShape, Motion, Pose, Provenance};
 use clothcombo_data::fit::FitSettings;
 use clothcombo_data::fit::hints::GarmentEntry;
-use clothcombo_data::format::PolygonMesh;
 use clothcombo_physics::contact::resolve::ResolveSettings;
-use clothcombo_physics::mesh::MeshError;
 use clothcombo_trainer::inference::{
-    Bodies, Draper, DraperSettings, FrameRange, GarmentCatalog, GivenGarment, MOST_RADIUS,
-    Outfit as PreparedOutfit, RefineSteps,
+    Bodies, Draper, DraperSettings, FrameRange, GarmentCatalog, GivenGarment, MOST_RADIUS, Outfit,
+    RefineSteps,
 };
 use clothcombo_trainer::system::paths::user_cache;
 use miette::{IntoDiagnostic, Report};
-use numpy::{PyReadonlyArray2, PyReadonlyArray3};
+use numpy::PyReadonlyArray3;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// A trained model with a body.
-#[pyclass(frozen, module = "clothcombo._native")]
-pub struct Model {
+#[pyclass(frozen, name = "Model", module = "clothcombo._native")]
+pub struct PyModel {
     draper: Draper,
     catalog: GarmentCatalog,
 }
 
 /// Frames of a motion file, or poses `[T, J, 3]` (radians) at a rate (1/s).
-#[derive(FromPyObject)]
-pub enum MotionInput<'py> {
+pub enum MotionInput {
     File(PathBuf),
-    Poses(PyReadonlyArray3<'py, f64>, f64),
+    Poses(Motion),
 }
 
-impl MotionInput<'_> {
-    fn motion(&self) -> PyResult<Result<Motion, PathBuf>> {
+impl FromPyObject<'_, '_> for MotionInput {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
+        if let Ok(path) = given.extract() {
+            return Ok(Self::File(path));
+        }
+        let (poses, frame_rate): (PyReadonlyArray3<'_, f64>, f64) = given.extract()?;
+        let poses = match (poses.as_array().dim(), poses.as_slice()) {
+            ((_, joints, 3), Ok(values)) if joints > 0 => {
+                let frames = values.as_chunks().0.chunks_exact(joints);
+                frames.map(|rotations| Pose { rotations: rotations.to_vec() }).collect()
+            }
+            _ => return Err(refused_text("the poses of a motion have the shape [T, J, 3]")),
+        };
+        let name = "given motion".to_owned();
+        Ok(Self::Poses(Motion { name, frame_rate, poses, source: Provenance::default() }))
+    }
+}
+
+impl MotionInput {
+    fn file(&self) -> Option<PathBuf> {
         match self {
-            Self::File(path) => Ok(Err(path.clone())),
-            Self::Poses(poses, frame_rate) => {
-                let poses = frames(poses)?.into_iter().map(|rotations| Pose { rotations }).collect();
-                let name = "given motion".to_owned();
-                Ok(Ok(Motion { name, frame_rate: *frame_rate, poses, source: Provenance::default() }))
+            Self::File(path) => Some(path.clone()),
+            Self::Poses(_) => None,
+        }
+    }
+
+    fn checked(self) -> Result<Motion, Report> {
+        match self {
+            Self::File(path) => Motion::load(&path).into_diagnostic(),
+            Self::Poses(given) => {
+                given.check().map_err(|what| Report::msg(format!("the motion: {what}")))?;
+                Ok(given)
             }
         }
     }
 }
 
 /// Garments of a model, ready to be draped on any body.
-#[pyclass(frozen, module = "clothcombo._native")]
-pub struct Outfit {
+#[pyclass(frozen, name = "Outfit", module = "clothcombo._native")]
+pub struct PyOutfit {
     draper: Draper,
-    outfit: Arc<PreparedOutfit>,
+    outfit: Arc<Outfit>,
 }
 
-/// A garment as given: a name, a mesh unless the name is that of a file or of a known garment, and hints as JSON.
-pub type GarmentInput<'py> =
-    (String, Option<(PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, u32>)>, String);
+/// A garment as given: a name; a mesh, or a file or known garment; and hints as JSON.
+pub type GarmentInput = (String, MeshInput, String);
 
-/// The same without Python.
-pub struct WantedGarment {
+/// The same with its hints read.
+pub struct RequestedGarment {
     pub name: String,
-    pub mesh: Option<Result<PolygonMesh, MeshError>>,
+    pub mesh: MeshInput,
     pub entry: GarmentEntry,
 }
 
-impl WantedGarment {
-    pub fn new((name, mesh, hints): GarmentInput<'_>) -> PyResult<Self> {
-        let mesh = mesh.map(|(positions, faces)| polygons(&positions, &faces)).transpose()?;
-        let entry = to_value(&hints, &name)?;
-        Ok(Self { name, mesh, entry })
+impl RequestedGarment {
+    pub fn new((name, mesh, hints): GarmentInput) -> PyResult<Self> {
+        Ok(Self { entry: to_value(&hints, &name)?, name, mesh })
     }
 
     /// What is read.
     pub fn file(&self) -> Option<PathBuf> {
-        let path = PathBuf::from(&self.name);
-        let is_path = self.name.contains('/') || path.extension().is_some();
-        (self.mesh.is_none() && is_path).then_some(path)
+        self.mesh.file().filter(|path| self.name.contains('/') || path.extension().is_some())
     }
 
     pub fn hints(&self) -> Result<FitSettings, Report> {
@@ -96,10 +114,9 @@ impl WantedGarment {
         let material = self.entry.material;
         material.check().map_err(|what| Report::msg(format!("{}: {what}", self.name)))?;
         let mut source = match self.mesh {
-            None => catalog.find(&self.name, draper.body(), fit, &hints)?,
-            Some(mesh) => {
-                let mesh = crate::arrays::named(&self.name, mesh)?;
-                catalog.place(&self.name, mesh, draper.body(), fit, &hints)?
+            MeshInput::File(_) => catalog.find(&self.name, draper.body(), fit, &hints)?,
+            MeshInput::Polygons(mesh) => {
+                catalog.place(&self.name, named(&self.name, mesh)?, draper.body(), fit, &hints)?
             }
         };
         source.add_material(material);
@@ -119,12 +136,12 @@ pub fn resolve_settings(gap_mm: f64, time_limit: Option<f64>) -> PyResult<Resolv
     let wrong = |_| refused_text(format!("time_limit is {time_limit:?}; hint: seconds above 0, or None"));
     let time = time_limit.map(Duration::try_from_secs_f64).transpose().map_err(wrong)?;
     let settings = ResolveSettings { gap: 1e-3 * gap_mm, time, ..ResolveSettings::default() };
-    settings.check().into_diagnostic().map_err(crate::call::refused)?;
+    settings.check().into_diagnostic().map_err(refused)?;
     Ok(settings)
 }
 
 #[pymethods]
-impl Model {
+impl PyModel {
     #[staticmethod]
     fn load(
         py: Python<'_>,
@@ -147,8 +164,8 @@ impl Model {
     }
 
     #[getter]
-    fn body(&self) -> Body {
-        Body { model: Arc::new(self.draper.body().clone()) }
+    fn body(&self) -> PyBody {
+        PyBody { model: Arc::new(self.draper.body().clone()) }
     }
 
     #[getter]
@@ -162,15 +179,15 @@ impl Model {
     }
 
     /// Reads, places and embeds garments, innermost first.
-    fn outfit(&self, py: Python<'_>, garments: Vec<GarmentInput<'_>>, fit: Option<bool>) -> PyResult<Outfit> {
-        let wanted = garments.into_iter().map(WantedGarment::new).collect::<PyResult<Vec<_>>>()?;
-        let files: Vec<PathBuf> = wanted.iter().filter_map(WantedGarment::file).collect();
+    fn outfit(&self, py: Python<'_>, garments: Vec<GarmentInput>, fit: Option<bool>) -> PyResult<PyOutfit> {
+        let wanted = garments.into_iter().map(RequestedGarment::new).collect::<PyResult<Vec<_>>>()?;
+        let files: Vec<PathBuf> = wanted.iter().filter_map(RequestedGarment::file).collect();
         call(py, &files, || {
             let found = wanted.into_iter().map(|garment| garment.find(&self.catalog, &self.draper, fit));
             let sources = found.collect::<Result<Vec<_>, Report>>()?;
             self.draper.check_garments(&sources)?;
             let outfit = Arc::new(self.draper.outfit(sources)?);
-            Ok::<_, Report>(Outfit { draper: self.draper.clone(), outfit })
+            Ok::<_, Report>(PyOutfit { draper: self.draper.clone(), outfit })
         })
     }
 
@@ -186,7 +203,7 @@ impl Model {
 }
 
 #[pymethods]
-impl Outfit {
+impl PyOutfit {
     #[getter]
     fn names(&self) -> Vec<String> {
         self.outfit.names().map(str::to_owned).collect()
@@ -197,18 +214,18 @@ impl Outfit {
         &self,
         py: Python<'_>,
         shape: Vec<f64>,
-        pose: Option<PoseInput<'_>>,
-        motion: Option<MotionInput<'_>>,
+        pose: Option<NamedPose>,
+        motion: Option<MotionInput>,
         frames: (usize, Option<usize>),
         every: usize,
-        posed: Option<PyReadonlyArray2<'_, f64>>,
-        t_pose: Option<PyReadonlyArray2<'_, f64>>,
+        posed: Option<CopiedRows>,
+        t_pose: Option<CopiedRows>,
         refine: Option<RefineInput>,
         resolve: bool,
         gap_mm: f64,
         time_limit: Option<f64>,
         smooth: Option<u16>,
-    ) -> PyResult<Drape> {
+    ) -> PyResult<PyDrape> {
         let refine = match refine {
             None => None,
             Some(RefineInput::Steps(steps)) => {
@@ -224,42 +241,33 @@ impl Outfit {
         }
         let post_process = resolve_settings(gap_mm, time_limit)?;
         let settings = DraperSettings { refine, resolve, post_process, ..self.draper.settings().clone() };
-        let pose = pose.map(|pose| pose.pose()).transpose()?;
-        let motion = motion.map(|motion| motion.motion()).transpose()?;
-        let posed = posed.as_ref().map(|p| rows(p).map(<[_]>::to_vec)).transpose()?;
-        let t_pose = t_pose.as_ref().map(|p| rows(p).map(<[_]>::to_vec)).transpose()?;
         let range = FrameRange { first: frames.0, end: frames.1 };
-        let files: Vec<PathBuf> = motion.iter().filter_map(|motion| motion.as_ref().err().cloned()).collect();
+        let files: Vec<PathBuf> = motion.iter().filter_map(MotionInput::file).collect();
         call(py, &files, || {
             let draper = self.draper.with(&settings);
             let body = draper.body();
             let bodies = match (motion, posed) {
                 (Some(motion), _) => {
-                    let motion = match motion {
-                        Ok(given) => {
-                            given.check().map_err(|what| Report::msg(format!("the motion: {what}")))?;
-                            given
-                        }
-                        Err(path) => Motion::load(&path).into_diagnostic()?,
-                    };
+                    let motion = motion.checked()?;
                     Bodies::in_motion(body, &shape, &motion, &motion.name, range, every)?
                 }
-                (None, Some(surface)) => {
+                (None, Some(CopiedRows(surface))) => {
                     let known = match &t_pose {
-                        Some(rest) => KnownShape::TPose(rest),
+                        Some(CopiedRows(rest)) => KnownShape::TPose(rest),
                         None => KnownShape::Parameters(&shape),
                     };
                     Bodies::of_surface(body, surface, known, "the posed body")?
                 }
                 (None, None) => {
-                    let (pose, name) = pose.unwrap_or_else(|| (Pose::t_pose(0), "T-pose".to_owned()));
+                    let t_pose = || NamedPose { pose: Pose::t_pose(0), name: "T-pose".to_owned() };
+                    let NamedPose { pose, name } = pose.unwrap_or_else(t_pose);
                     Bodies::in_pose(body, &shape, pose, &name)
                 }
             };
             draper.check_bodies(&bodies)?;
             let outfit = self.outfit.clone();
             let (drapes, smoothing) = draper.drape_bodies(&outfit, &bodies, smooth, |_| ())?;
-            Ok::<_, Report>(Drape { draper, outfit, drapes, bodies, smoothing })
+            Ok::<_, Report>(PyDrape { draper, outfit, drapes, bodies, smoothing })
         })
     }
 }

@@ -1,6 +1,6 @@
 //! The eight energies of garments on a posed body, with their gradients.
 
-use crate::arrays::{MeshInput, from_json, moved, rows, to_value};
+use crate::arrays::{CopiedRows, MeshInput, array, from_json, moved, rows, to_value, triangles};
 use crate::call::{call, refused, refused_text};
 use clothcombo_data::asset::GarmentMaterial;
 use clothcombo_physics::contact::resolve::FARTHEST_POSITION;
@@ -30,7 +30,7 @@ pub fn default_losses(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
 }
 
 /// What does not depend on the body.
-struct Garments {
+struct SceneGarments {
     rest: Vec<TriMesh>,
     /// For a held garment, where its canonical positions are without any learned displacement.
     references: Vec<Option<Vec<[f64; 3]>>>,
@@ -39,64 +39,70 @@ struct Garments {
     materials: Vec<GarmentMaterial>,
     /// Inner and outer garment of every pair.
     layers: Vec<(usize, usize)>,
-    single: OnceLock<Vec<Arc<GarmentEnergies<f32>>>>,
-    double: OnceLock<Vec<Arc<GarmentEnergies<f64>>>>,
 }
 
 /// Garments on a posed body, prepared once for each precision that positions come in.
-#[pyclass(frozen, module = "clothcombo._native")]
-pub struct Scene {
-    garments: Arc<Garments>,
+#[pyclass(frozen, name = "Scene", module = "clothcombo._native")]
+pub struct PyScene {
+    garments: Arc<SceneGarments>,
     body: TriMesh,
     /// Initial skinning of every vertex, by which held garments are pulled back.
     transforms: Option<Vec<Transform>>,
-    single: OnceLock<SceneEnergy<f32>>,
-    double: OnceLock<SceneEnergy<f64>>,
+    single: Prepared<f32>,
+    double: Prepared<f64>,
+}
+
+/// What is prepared when it is first needed.
+struct Prepared<T: Real> {
+    /// Shared by the bodies that the garments are on.
+    garments: Arc<OnceLock<Vec<Arc<GarmentEnergies<T>>>>>,
+    scene: OnceLock<SceneEnergy<T>>,
+}
+
+impl<T: Real> Prepared<T> {
+    /// For garments that are prepared already, or not yet.
+    fn of(garments: Arc<OnceLock<Vec<Arc<GarmentEnergies<T>>>>>) -> Self {
+        Self { garments, scene: OnceLock::new() }
+    }
 }
 
 /// A precision of positions.
 trait Precision: Real + Element {
-    fn of_garments(garments: &Garments) -> &OnceLock<Vec<Arc<GarmentEnergies<Self>>>>;
-    fn of_scene(scene: &Scene) -> &OnceLock<SceneEnergy<Self>>;
+    fn prepared(scene: &PyScene) -> &Prepared<Self>;
 }
 
 impl Precision for f32 {
-    fn of_garments(garments: &Garments) -> &OnceLock<Vec<Arc<GarmentEnergies<Self>>>> {
-        &garments.single
-    }
-
-    fn of_scene(scene: &Scene) -> &OnceLock<SceneEnergy<Self>> {
+    fn prepared(scene: &PyScene) -> &Prepared<Self> {
         &scene.single
     }
 }
 
 impl Precision for f64 {
-    fn of_garments(garments: &Garments) -> &OnceLock<Vec<Arc<GarmentEnergies<Self>>>> {
-        &garments.double
-    }
-
-    fn of_scene(scene: &Scene) -> &OnceLock<SceneEnergy<Self>> {
+    fn prepared(scene: &PyScene) -> &Prepared<Self> {
         &scene.double
     }
 }
 
-impl Garments {
-    fn energies<T: Precision>(&self) -> Result<&[Arc<GarmentEnergies<T>>], Report> {
-        let place = T::of_garments(self);
-        if place.get().is_none() {
-            let settings = self.losses.energy_settings();
-            let made = (0..self.rest.len()).into_par_iter().map(|i| {
-                let rest = &self.rest[i];
-                let settings =
-                    EnergySettings { material: self.materials[i].over(&settings.material), ..settings };
-                let held = self.references[i].is_some();
-                let energies = GarmentEnergies::new(rest, &Topology::new(rest), &settings, held);
-                energies.map(Arc::new).into_diagnostic().wrap_err_with(|| format!("garment {i}"))
-            });
-            let made = made.collect::<Result<_, Report>>()?;
-            let _ = place.set(made);
-        }
-        Ok(place.get().expect("it was just set"))
+/// What `place` holds, which `make` makes the first time.
+fn made_once<V>(place: &OnceLock<V>, make: impl FnOnce() -> Result<V, Report>) -> Result<&V, Report> {
+    if place.get().is_none() {
+        let _ = place.set(make()?);
+    }
+    Ok(place.get().expect("it was just set"))
+}
+
+impl SceneGarments {
+    fn energies<T: Real>(&self) -> Result<Vec<Arc<GarmentEnergies<T>>>, Report> {
+        let settings = self.losses.energy_settings();
+        let made = (0..self.rest.len()).into_par_iter().map(|i| {
+            let rest = &self.rest[i];
+            let settings =
+                EnergySettings { material: self.materials[i].over(&settings.material), ..settings };
+            let held = self.references[i].is_some();
+            let energies = GarmentEnergies::new(rest, &Topology::new(rest), &settings, held);
+            energies.map(Arc::new).into_diagnostic().wrap_err_with(|| format!("garment {i}"))
+        });
+        made.collect()
     }
 
     fn vertex_count(&self) -> usize {
@@ -104,21 +110,18 @@ impl Garments {
     }
 }
 
-impl Scene {
+impl PyScene {
     fn energy<T: Precision>(&self) -> Result<&SceneEnergy<T>, Report> {
-        let place = T::of_scene(self);
-        if place.get().is_none() {
-            let _ = place.set(self.made()?);
-        }
-        Ok(place.get().expect("it was just set"))
+        made_once(&T::prepared(self).scene, || self.made())
     }
 
     fn made<T: Precision>(&self) -> Result<SceneEnergy<T>, Report> {
-        let Garments { rest, references, losses, layers, .. } = &*self.garments;
+        let SceneGarments { rest, references, losses, layers, .. } = &*self.garments;
         let counts: Vec<usize> = rest.iter().map(TriMesh::vertex_count).collect();
         // The weights that the losses end with.
         let weights = scene_weights(losses, 1.0, &counts, layers);
-        let garments = self.garments.energies::<T>()?.iter().zip(references).zip(weights.garments);
+        let energies = made_once(&T::prepared(self).garments, || self.garments.energies())?;
+        let garments = energies.iter().zip(references).zip(weights.garments);
         let garments = garments.map(|((energies, reference), weights)| SceneGarment {
             energies: energies.clone(),
             holding_reference: reference.iter().flatten().map(|p| from_f64(*p)).collect(),
@@ -157,15 +160,15 @@ fn transforms(rows: &PyReadonlyArray2<'_, f64>, vertices: usize) -> PyResult<Vec
 }
 
 #[pymethods]
-impl Scene {
+impl PyScene {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "the keyword arguments of the package's `Scene`")]
     fn new(
         py: Python<'_>,
-        garments: Vec<MeshInput<'_>>,
-        body: MeshInput<'_>,
+        garments: Vec<MeshInput>,
+        body: MeshInput,
         held: Vec<bool>,
-        references: Vec<Option<PyReadonlyArray2<'_, f64>>>,
+        references: Vec<Option<CopiedRows>>,
         skinning: Option<PyReadonlyArray2<'_, f64>>,
         layers: Option<Vec<(usize, usize)>>,
         losses: &str,
@@ -196,10 +199,6 @@ impl Scene {
         }
         materials.resize(count, GarmentMaterial::default());
         let files: Vec<PathBuf> = garments.iter().chain([&body]).filter_map(MeshInput::file).collect();
-        let garments = garments.iter().enumerate().map(|(i, mesh)| mesh.taken(&format!("garment {i}")));
-        let (garments, body) = (garments.collect::<PyResult<Vec<_>>>()?, body.taken("body")?);
-        let references: Vec<_> =
-            references.iter().map(|r| r.as_ref().map(rows).transpose()).collect::<PyResult<_>>()?;
         let skinning = skinning.as_ref().map(|s| transforms(s, s.as_array().nrows())).transpose()?;
         let layers = layers.unwrap_or_else(|| {
             (0..count).flat_map(|outer| (0..outer).map(move |inner| (inner, outer))).collect()
@@ -211,28 +210,29 @@ impl Scene {
             return Err(refused(Report::from_err(error)));
         }
         call(py, &files, || {
-            let body = checked_body(body.triangles()?)?;
-            let rest: Vec<TriMesh> = garments
-                .into_iter()
-                .map(|garment| Ok(garment.triangles()?.mesh))
-                .collect::<Result<_, Report>>()?;
-            let references = held.iter().zip(&references).enumerate().map(|(i, (held, reference))| {
-                let given =
-                    |positions: &&[[f64; 3]]| moved(&format!("reference {i}"), &rest[i], positions.to_vec());
-                let reference = reference.as_ref().map(given).transpose()?;
+            let body = checked_body(body.triangles("body")?)?;
+            let garments = triangles("garment", garments)?;
+            let rest: Vec<TriMesh> = garments.into_iter().map(|garment| garment.mesh).collect();
+            let references = held.iter().zip(references).enumerate().map(|(i, (held, reference))| {
+                let given = |CopiedRows(positions)| moved(&format!("reference {i}"), &rest[i], positions);
+                let reference = reference.map(given).transpose()?;
                 Ok(held.then(|| reference.as_ref().unwrap_or(&rest[i]).positions().to_vec()))
             });
             let references = references.collect::<Result<_, Report>>()?;
-            let (single, double) = (OnceLock::new(), OnceLock::new());
-            let garments = Garments { rest, references, losses, materials, layers, single, double };
+            let garments = SceneGarments { rest, references, losses, materials, layers };
             if let Some(found) = skinning.as_ref().filter(|t| t.len() != garments.vertex_count()) {
                 let (found, expected) = (found.len(), garments.vertex_count());
                 return Err(Report::msg(format!(
                     "{found} transforms for {expected} vertices of all garments"
                 )));
             }
-            let (single, double) = (OnceLock::new(), OnceLock::new());
-            let scene = Self { garments: Arc::new(garments), body, transforms: skinning, single, double };
+            let scene = Self {
+                garments: Arc::new(garments),
+                body,
+                transforms: skinning,
+                single: Prepared::of(Arc::default()),
+                double: Prepared::of(Arc::default()),
+            };
             match is_double {
                 true => scene.energy::<f64>().map(|_| ())?,
                 false => scene.energy::<f32>().map(|_| ())?,
@@ -245,10 +245,9 @@ impl Scene {
     fn on_body(
         &self,
         py: Python<'_>,
-        positions: PyReadonlyArray2<'_, f64>,
+        positions: CopiedRows,
         skinning: Option<PyReadonlyArray2<'_, f64>>,
     ) -> PyResult<Self> {
-        let positions = rows(&positions)?.to_vec();
         let skinning = skinning.as_ref().map(|s| transforms(s, self.garments.vertex_count())).transpose()?;
         if self.transforms.is_some() && skinning.is_none() && self.needs_transforms() {
             return Err(refused_text(
@@ -256,14 +255,12 @@ impl Scene {
             ));
         }
         call(py, &[], || {
-            let (single, double) = (OnceLock::new(), OnceLock::new());
-            let body = moved("body", &self.body, positions)?;
             Ok::<_, Report>(Self {
                 garments: self.garments.clone(),
-                body,
+                body: moved("body", &self.body, positions.0)?,
                 transforms: skinning,
-                single,
-                double,
+                single: Prepared::of(self.single.garments.clone()),
+                double: Prepared::of(self.double.garments.clone()),
             })
         })
     }
@@ -281,7 +278,7 @@ impl Scene {
     }
 }
 
-impl Scene {
+impl PyScene {
     fn needs_transforms(&self) -> bool {
         let weight = self.garments.losses.weight(Term::Holding).at(1.0);
         weight != 0.0 && self.garments.references.iter().any(Option::is_some)
@@ -337,7 +334,7 @@ type Evaluated<'py, T> =
 
 fn evaluate<'py, T: Precision>(
     py: Python<'py>,
-    scenes: &[PyRef<'py, Scene>],
+    scenes: &[PyRef<'py, PyScene>],
     posed: &[PyReadonlyArray2<'py, T>],
     canonical: &[Option<PyReadonlyArray2<'py, T>>],
     sample: u32,
@@ -348,7 +345,7 @@ fn evaluate<'py, T: Precision>(
     let posed = posed.iter().map(rows).collect::<PyResult<Vec<_>>>()?;
     let canonical =
         canonical.iter().map(|c| c.as_ref().map_or(Ok(&[][..]), rows)).collect::<PyResult<Vec<_>>>()?;
-    let scenes: Vec<&Scene> = scenes.iter().map(|scene| &**scene).collect();
+    let scenes: Vec<&PyScene> = scenes.iter().map(|scene| &**scene).collect();
     let values = call(py, &[], || {
         let one = |i: usize| scenes[i].evaluate(posed[i], canonical[i], sample);
         match scenes.len() {
@@ -358,11 +355,10 @@ fn evaluate<'py, T: Precision>(
     })?;
     let results = values.into_iter().zip(scenes).zip(canonical).map(|((value, scene), canonical)| {
         let losses = &scene.garments.losses;
-        let terms = Scene::terms(&value, |term| losses.weight(term).at(1.0) != 0.0);
-        let of_canonical =
-            (!canonical.is_empty()).then(|| crate::arrays::array(py, value.canonical_gradient));
+        let terms = PyScene::terms(&value, |term| losses.weight(term).at(1.0) != 0.0);
+        let of_canonical = (!canonical.is_empty()).then(|| array(py, value.canonical_gradient));
         let terms = PyArray1::from_slice(py, &terms);
-        (value.total, terms, crate::arrays::array(py, value.posed_gradient), of_canonical)
+        (value.total, terms, array(py, value.posed_gradient), of_canonical)
     });
     Ok(results.collect())
 }
@@ -371,7 +367,7 @@ fn evaluate<'py, T: Precision>(
 #[pyfunction]
 pub fn evaluate_f32<'py>(
     py: Python<'py>,
-    scenes: Vec<PyRef<'py, Scene>>,
+    scenes: Vec<PyRef<'py, PyScene>>,
     posed: Vec<PyReadonlyArray2<'py, f32>>,
     canonical: Vec<Option<PyReadonlyArray2<'py, f32>>>,
     sample: u32,
@@ -383,7 +379,7 @@ pub fn evaluate_f32<'py>(
 #[pyfunction]
 pub fn evaluate_f64<'py>(
     py: Python<'py>,
-    scenes: Vec<PyRef<'py, Scene>>,
+    scenes: Vec<PyRef<'py, PyScene>>,
     posed: Vec<PyReadonlyArray2<'py, f64>>,
     canonical: Vec<Option<PyReadonlyArray2<'py, f64>>>,
     sample: u32,

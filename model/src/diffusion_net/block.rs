@@ -7,8 +7,8 @@ use super::{ComplexMixing, SpectralDiffusion};
 use crate::initializer::{Initializer, fan_in_bound};
 use crate::linear::Linear;
 use crate::ops::{
-    Activation, DiffusionMlpArguments, activate, activate_residual, diffusion_mlp, gradient_features,
-    product, product_add, runs_on_host,
+    Activation, activate, activate_residual, diffusion_mlp, gradient_features, lies_on_host, product,
+    product_add,
 };
 use crate::tensors::GarmentTensors;
 
@@ -71,11 +71,12 @@ impl DiffusionBlock {
 
     /// `[V,C]` → `[V,C]`.
     pub fn forward(&self, features: Tensor<2>, garment: &GarmentTensors) -> Tensor<2> {
-        let fused = runs_on_host(&features);
+        let fused = lies_on_host(&features);
         self.forward_in_form(features, garment, fused)
     }
 
-    /// All steps at the vertices as one operation of the host, or each as its own.
+    /// All that happens at the vertices as one operation of the host, or every step as its own: what GPUs run, and the oracle of
+    /// the fused form.
     pub(super) fn forward_in_form(
         &self,
         features: Tensor<2>,
@@ -85,60 +86,42 @@ impl DiffusionBlock {
         let coefficients = product(garment.projection.clone(), features.clone());
         let coefficients = self.diffusion.diffuse(coefficients, garment.decay.clone());
 
-        let real = product(coefficients.clone(), self.mixing.real.val());
-        let imaginary = product(coefficients.clone(), self.mixing.imaginary.val());
-        let diffused = product(coefficients.clone(), self.mlp.diffused.val());
-        let mixed = [coefficients, real, imaginary];
-        match fused {
-            true => self.fused(features, mixed, diffused, garment),
-            false => self.step_by_step(features, mixed, diffused, garment),
+        let Self { mixing, mlp, .. } = self;
+        let real = product(coefficients.clone(), mixing.real.val());
+        let imaginary = product(coefficients.clone(), mixing.imaginary.val());
+        let diffused = product(coefficients.clone(), mlp.diffused.val());
+        let bias = mlp.bias.val().unsqueeze();
+        let (gradient_basis, basis) = (garment.gradient_basis.clone(), garment.basis.clone());
+        if fused {
+            return diffusion_mlp([
+                features,
+                gradient_basis,
+                basis,
+                coefficients,
+                real,
+                imaginary,
+                diffused,
+                mlp.gradient.val(),
+                mlp.input.val(),
+                bias,
+                mlp.hidden.weight.val(),
+                mlp.hidden.bias_row(),
+                mlp.output.weight.val(),
+                mlp.output.bias_row(),
+            ]);
         }
-    }
 
-    /// All that happens at the vertices as one operation of the host.
-    fn fused(
-        &self,
-        features: Tensor<2>,
-        coefficients: [Tensor<2>; 3],
-        diffused: Tensor<2>,
-        garment: &GarmentTensors,
-    ) -> Tensor<2> {
-        let mlp = &self.mlp;
-        let layer = |layer: &Linear| [layer.weight.val(), layer.bias_row()];
-        let arguments = DiffusionMlpArguments {
-            features,
-            gradient_basis: garment.gradient_basis.clone(),
-            basis: garment.basis.clone(),
-            coefficients,
-            diffused,
-            gradient_weight: mlp.gradient.val(),
-            input_weight: mlp.input.val(),
-            bias: mlp.bias.val().unsqueeze(),
-            hidden: layer(&mlp.hidden),
-            output: layer(&mlp.output),
-        };
-        diffusion_mlp(arguments)
-    }
-
-    /// Every step as an operation of its own: what GPUs run, and the oracle of the fused form.
-    fn step_by_step(
-        &self,
-        features: Tensor<2>,
-        coefficients: [Tensor<2>; 3],
-        diffused: Tensor<2>,
-        garment: &GarmentTensors,
-    ) -> Tensor<2> {
         // c and its two mixtures, expanded to both gradient axes of all vertices by one product.
-        let mixed = Tensor::cat(coefficients.into(), 1);
-        let gradient = gradient_features(product(garment.gradient_basis.clone(), mixed));
+        let mixed = Tensor::cat(vec![coefficients, real, imaginary], 1);
+        let gradient = gradient_features(product(gradient_basis, mixed));
 
         // Three products into one matrix: the first layer on [x, x_diff, gradient features].
-        let sum = product(gradient, self.mlp.gradient.val());
-        let sum = product_add(garment.basis.clone(), diffused, sum);
-        let sum = product_add(features.clone(), self.mlp.input.val(), sum);
-        let hidden = activate(Activation::Relu, sum, self.mlp.bias.val().unsqueeze());
-        let hidden = activate(Activation::Relu, self.mlp.hidden.product(hidden), self.mlp.hidden.bias_row());
-        let output = &self.mlp.output;
+        let sum = product(gradient, mlp.gradient.val());
+        let sum = product_add(basis, diffused, sum);
+        let sum = product_add(features.clone(), mlp.input.val(), sum);
+        let hidden = activate(Activation::Relu, sum, bias);
+        let hidden = activate(Activation::Relu, mlp.hidden.product(hidden), mlp.hidden.bias_row());
+        let output = &mlp.output;
         activate_residual(Activation::Identity, output.product(hidden), output.bias_row(), features)
     }
 }

@@ -3,11 +3,10 @@
 //! Diffusion over k eigenpairs makes x_diff = Φ c with c = e^{−λt} ⊙ (Φᵀ M x), which has only k rows. Everything linear that
 //! follows is applied to c before it is expanded to the vertices: the tangent gradients through the precomputed G_xΦ and
 //! G_yΦ, their complex mixing, and the part of the first MLP layer that acts on x_diff. No sparse operation is left.
-//! [`plain`] has the published order of operations; both agree to rounding.
+//! It agrees with the published order of operations to rounding.
 
 mod block;
 mod mixing;
-pub mod plain;
 mod spectral;
 #[cfg(test)]
 mod tests;

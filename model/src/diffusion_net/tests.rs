@@ -4,6 +4,8 @@ use crate::testing::{
     parameter_gradients, seeded, values,
 };
 
+mod plain;
+
 fn net(width: usize) -> DiffusionNet {
     let device = device();
     let mut net = seeded(5, |start| DiffusionNet::new(3, width, 6, start));

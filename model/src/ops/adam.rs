@@ -1,14 +1,14 @@
 //! One Adam update of a parameter and both its moments, in a single pass over memory.
 
 #[cfg(feature = "gpu")]
-use super::gpu;
-use burn::backend::Backend;
-#[cfg(feature = "gpu")]
 use burn::backend::Cube;
 use burn::tensor::Tensor;
 use rayon::prelude::*;
 
-use super::host::{CHUNK_ELEMENTS, HostBackend, vectorised};
+#[cfg(feature = "gpu")]
+use super::gpu;
+use super::host::{CHUNK_ELEMENTS, HostBackend};
+use super::instruction_set::vectorised;
 use super::operation::{TensorKernel, run};
 use super::tensors::Tensors;
 
@@ -42,35 +42,16 @@ pub fn adam_step<const D: usize>(
 
 /// Arguments: parameter, gradient, first and second moment. Results: parameter, first and second moment.
 impl TensorKernel for AdamFactors {
-    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let [parameter, gradient, first, second] = arguments.take();
-        let average = |old, new, beta: f32| {
-            let kept = B::float_mul_scalar(old, f64::from(beta).into());
-            B::float_add(kept, B::float_mul_scalar(new, f64::from(1.0 - beta).into()))
-        };
-        let square = B::float_mul(gradient.clone(), gradient.clone());
-        let first = average(first, gradient, self.beta_1);
-        let second = average(second, square, self.beta_2);
-        let root = B::float_add_scalar(B::float_sqrt(second.clone()), f64::from(self.epsilon).into());
-        let step = B::float_div(B::float_mul_scalar(first.clone(), f64::from(self.step_size).into()), root);
-        [B::float_sub(parameter, step), first, second].into()
-    }
-
     #[cfg(feature = "gpu")]
     fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
-        gpu::adam(arguments.take(), *self).into()
+        let Self { beta_1, beta_2, step_size, epsilon } = *self;
+        gpu::adam(arguments.take(), [beta_1, beta_2], step_size, epsilon).into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [mut parameter, mut gradient, mut first, mut second] = arguments.take();
-        let (Some(p), Some(g), Some(m), Some(v)) = (
-            B::values_mut(&mut parameter),
-            B::values(&mut gradient),
-            B::values_mut(&mut first),
-            B::values_mut(&mut second),
-        ) else {
-            return self.composed([parameter, gradient, first, second].into());
-        };
+        let (p, g) = (B::values_mut(&mut parameter), B::values(&mut gradient));
+        let (m, v) = (B::values_mut(&mut first), B::values_mut(&mut second));
         let parts = p.par_chunks_mut(CHUNK_ELEMENTS).zip(g.par_chunks(CHUNK_ELEMENTS));
         let moments = m.par_chunks_mut(CHUNK_ELEMENTS).zip(v.par_chunks_mut(CHUNK_ELEMENTS));
         parts.zip(moments).for_each(|((p, g), (m, v))| {

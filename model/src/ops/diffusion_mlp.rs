@@ -1,74 +1,34 @@
 //! What a DiffusionNet block does at every vertex, as one operation in host memory: gradient features and the MLP.
 
-use burn::backend::Backend;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
-use super::host::{HostBackend, MatrixView};
-use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
-use super::row_blocks::HOST_ONLY;
+use super::host::HostBackend;
+use super::operation::{
+    ArgumentGradients, BackwardPass, FusedOps, Operation, Saved, Saves, TensorKernel, apply,
+};
 use super::tensors::Tensors;
-use super::tile::StridedMatrix;
 
 mod backward;
 mod forward;
 
-/// A block of width C on V vertices with k eigenpairs: what it is applied to, and its parameters.
-pub struct DiffusionMlpArguments {
-    /// Features x `[V,C]`.
-    pub features: Tensor<2>,
-    /// Gradients of the eigenvectors along both axes, one below the other `[2V,k]`; a constant.
-    pub gradient_basis: Tensor<2>,
-    /// Eigenvectors Φ `[V,k]`; a constant.
-    pub basis: Tensor<2>,
-    /// Coefficients c after diffusion, and c times the real and imaginary part of the mixing matrix, `[k,C]` each.
-    pub coefficients: [Tensor<2>; 3],
-    /// Coefficients of the diffused features' part of the first layer `[k,C]`.
-    pub diffused: Tensor<2>,
-    /// First layer, part that acts on the gradient features `[C,C]`.
-    pub gradient_weight: Tensor<2>,
-    /// First layer, part that acts on the features `[C,C]`.
-    pub input_weight: Tensor<2>,
-    /// Bias of the first layer `[1,C]`.
-    pub bias: Tensor<2>,
-    /// Second hidden layer `[C,C]`, `[1,C]`.
-    pub hidden: [Tensor<2>; 2],
-    /// Output layer `[C,C]`, `[1,C]`.
-    pub output: [Tensor<2>; 2],
-}
-
-/// `x + MLP(x, Φ·diffused, gradient features)` `[V,C]`, where the tensors [lie in host memory](super::runs_on_host).
+/// `x + MLP(x, Φ·diffused, gradient features)` `[V,C]` of a block of width C on V vertices with k eigenpairs, where the tensors
+/// [lie in host memory](super::lies_on_host).
 ///
-/// With `x0 x1 x2` and `y0 y1 y2` for the three `coefficients` expanded to both axes, the gradient features are
-/// `tanh(x0 (x1 − y2) + y0 (y1 + x2))`.
-pub fn diffusion_mlp(arguments: DiffusionMlpArguments) -> Tensor<2> {
-    let a = arguments;
-    let [coefficients, real, imaginary] = a.coefficients;
-    let [hidden_weight, hidden_bias] = a.hidden;
-    let [output_weight, output_bias] = a.output;
-    let arguments = [
-        a.features,
-        a.gradient_basis,
-        a.basis,
-        coefficients,
-        real,
-        imaginary,
-        a.diffused,
-        a.gradient_weight,
-        a.input_weight,
-        a.bias,
-        hidden_weight,
-        hidden_bias,
-        output_weight,
-        output_bias,
-    ];
+/// With `x0 x1 x2` and `y0 y1 y2` for three coefficients expanded to both axes, the gradient features are
+/// `tanh(x0 (x1 − y2) + y0 (y1 + x2))`. Arguments:
+///
+/// - features x `[V,C]`;
+/// - gradients of the eigenvectors along both axes, one below the other `[2V,k]`, and the eigenvectors Φ `[V,k]`: constants;
+/// - coefficients c after diffusion, and c times the real and times the imaginary part of the mixing matrix, `[k,C]` each;
+/// - coefficients of the diffused features' part of the first layer `[k,C]`;
+/// - weights of the first layer that act on the gradient features and on the features, `[C,C]` each, and its bias `[1,C]`;
+/// - weight `[C,C]` and bias `[1,C]` of the second hidden layer, and of the output layer.
+pub fn diffusion_mlp(arguments: [Tensor<2>; 14]) -> Tensor<2> {
     apply(DiffusionMlp { recorded: false }, arguments)
 }
 
-/// Matrices `[V,C]` that the backward pass reads: x0, y0, x1 − y2, y1 + x2, gradient features, both hidden layers.
-const STATES: usize = 7;
-
-/// Arguments in the order of [`DiffusionMlpArguments`].
+/// Arguments of [`diffusion_mlp`].
 #[derive(Clone, Debug)]
 struct DiffusionMlp {
     /// Whether what the backward pass reads is a result too.
@@ -76,12 +36,8 @@ struct DiffusionMlp {
 }
 
 impl TensorKernel for DiffusionMlp {
-    fn composed<B: Backend>(&self, _: Tensors<B>) -> Tensors<B> {
-        unreachable!("{HOST_ONLY}")
-    }
-
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        forward::run::<B>(self, arguments.take())
+        forward::run::<B>(self.recorded, arguments.take())
     }
 }
 
@@ -96,32 +52,17 @@ impl Operation<14> for DiffusionMlp {
         Saves { arguments: std::array::from_fn(saved), result: false }
     }
 
+    /// Of all arguments but the bases.
+    fn gradients_on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        backward::run::<B>(arguments.take())
+    }
+
     fn backward<B: FusedOps>(
         &self,
         saved: Saved<B, 14>,
         gradient: FloatTensor<B>,
     ) -> ArgumentGradients<B, 14> {
-        let mut gradients = B::run(&DiffusionMlpGradients, saved.with(gradient)).0.into_iter();
+        let mut gradients = B::run(&BackwardPass(self), saved.with(gradient)).0.into_iter();
         std::array::from_fn(|argument| if matches!(argument, 1 | 2) { None } else { gradients.next() })
     }
-}
-
-/// Gradients of all arguments but the bases, from features, bases, weights, what the forward pass recorded and the gradient of
-/// the result.
-#[derive(Clone, Debug)]
-struct DiffusionMlpGradients;
-
-impl TensorKernel for DiffusionMlpGradients {
-    fn composed<B: Backend>(&self, _: Tensors<B>) -> Tensors<B> {
-        unreachable!("{HOST_ONLY}")
-    }
-
-    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        backward::run::<B>(arguments.take())
-    }
-}
-
-/// The gradients of the eigenvectors along both axes, from a vertex on.
-fn axes(gradient_basis: &MatrixView<'_>, vertex: usize) -> [StridedMatrix; 2] {
-    [0, 1].map(|axis| gradient_basis.strided().from(axis * gradient_basis.rows() / 2 + vertex, 0))
 }

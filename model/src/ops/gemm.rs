@@ -3,34 +3,23 @@
 
 use std::mem::MaybeUninit;
 
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Flex, TensorMetadata};
 use rayon::prelude::*;
 
-use super::tile::{OutputBlock, RightFactor, StridedMatrix};
+use super::matrix_view::MatrixView;
+use super::tile::{OutputBlock, RightFactor};
 
 /// Multiplications and additions below which a second thread costs more than it saves.
 const PARALLEL_FROM: usize = 192 * 192 * 192;
 /// Rows that one task multiplies: with their terms they fit the second-level cache.
-const ROWS_PER_BLOCK: usize = 96;
+const ROWS_PER_TASK: usize = 96;
 /// Terms that are added up at once: a panel of so many stays in the first two levels of cache.
 const TERMS_PER_BLOCK: usize = 512;
 /// The same where the left factor is copied too.
 const TERMS_PER_COPY: usize = 192;
 
-impl StridedMatrix {
-    /// The f32 elements of a matrix.
-    fn of(matrix: &FloatTensor<Flex>) -> Self {
-        let layout = matrix.layout();
-        let [row_stride, column_stride] = [layout.strides()[0], layout.strides()[1]];
-        let first = matrix.storage::<f32>()[layout.start_offset()..].as_ptr();
-        Self { first, row_stride, column_stride }
-    }
-}
-
-/// `lhs·rhs` of f32 matrices, none of them empty, row by row.
-pub(super) fn product(lhs: &FloatTensor<Flex>, rhs: &FloatTensor<Flex>) -> Vec<f32> {
-    let count = lhs.shape()[0] * rhs.shape()[1];
+/// `lhs·rhs`, row by row.
+pub(super) fn product(lhs: MatrixView<'_>, rhs: MatrixView<'_>) -> Vec<f32> {
+    let count = lhs.rows() * rhs.columns();
     let mut values = Vec::with_capacity(count);
     // SAFETY: nothing is added; all elements of the product are written.
     unsafe {
@@ -41,7 +30,7 @@ pub(super) fn product(lhs: &FloatTensor<Flex>, rhs: &FloatTensor<Flex>) -> Vec<f
 }
 
 /// Adds `lhs·rhs` to `sum`, whose rows lie one after another.
-pub(super) fn add_product(lhs: &FloatTensor<Flex>, rhs: &FloatTensor<Flex>, sum: &mut [f32]) {
+pub(super) fn add_product(lhs: MatrixView<'_>, rhs: MatrixView<'_>, sum: &mut [f32]) {
     // SAFETY: the elements are initialised and stay so: only floats are written.
     unsafe { write(lhs, rhs, &mut *(std::ptr::from_mut(sum) as *mut [MaybeUninit<f32>]), true) };
 }
@@ -50,24 +39,24 @@ pub(super) fn add_product(lhs: &FloatTensor<Flex>, rhs: &FloatTensor<Flex>, sum:
 ///
 /// # Safety
 /// `output` is initialised if `add`.
-unsafe fn write(
-    lhs: &FloatTensor<Flex>,
-    rhs: &FloatTensor<Flex>,
-    output: &mut [MaybeUninit<f32>],
-    add: bool,
-) {
-    let size @ [rows, inner, columns] = [lhs.shape()[0], lhs.shape()[1], rhs.shape()[1]];
-    assert_eq!(inner, rhs.shape()[0], "the inner sizes of a product differ");
+unsafe fn write(lhs: MatrixView<'_>, rhs: MatrixView<'_>, output: &mut [MaybeUninit<f32>], add: bool) {
+    let [rows, inner, columns] = [lhs.rows(), lhs.columns(), rhs.columns()];
+    assert_eq!(inner, rhs.rows(), "the inner sizes of a product differ");
     assert_eq!(output.len(), rows * columns, "the output of a product has another size");
-    let (lhs, rhs) = (StridedMatrix::of(lhs), StridedMatrix::of(rhs));
-    let output = OutputBlock { first: output.as_mut_ptr().cast(), row_stride: columns };
     let work = rows.saturating_mul(inner).saturating_mul(columns);
+    if work == 0 && !add {
+        output.fill(MaybeUninit::new(0.0));
+    }
+    if work == 0 {
+        return;
+    }
+    let output = OutputBlock { first: output.as_mut_ptr().cast(), row_stride: columns };
     let threads = if work < PARALLEL_FROM { 1 } else { rayon::current_num_threads() };
-    // SAFETY: the steps are those of the tensors, whose elements all lie in their storage; the rest is the caller's promise.
+    // SAFETY: the output has the size of the product; the rest is the caller's promise.
     unsafe {
         match inner > 2 * rows && inner > TERMS_PER_COPY {
-            true => write_long_sums(lhs, rhs, output, size, add, threads),
-            false => write_rows(lhs, rhs, output, size, add, threads),
+            true => write_long_sums(lhs, rhs, output, add, threads),
+            false => write_rows(lhs, rhs, output, add, threads),
         }
     }
 }
@@ -75,34 +64,29 @@ unsafe fn write(
 /// A result of many rows: the right factor is rearranged once, and every task multiplies a block of rows.
 ///
 /// # Safety
-/// `lhs` is a matrix of `[rows, inner]` elements, `rhs` of `[inner, columns]`; `output` of `[rows, columns]` is initialised if
-/// `add`.
+/// `output` has the size of the product, and is initialised if `add`.
 unsafe fn write_rows(
-    lhs: StridedMatrix,
-    rhs: StridedMatrix,
+    lhs: MatrixView<'_>,
+    rhs: MatrixView<'_>,
     output: OutputBlock,
-    [rows, inner, columns]: [usize; 3],
     add: bool,
     threads: usize,
 ) {
-    let mut right = RightFactor::default();
-    // SAFETY: promised.
-    unsafe { right.fill(rhs, [inner, columns]) };
+    let right = RightFactor::new(rhs);
+    let (rows, inner) = (lhs.rows(), lhs.columns());
     let block = |block: usize| {
-        let first = block * ROWS_PER_BLOCK;
-        let count = ROWS_PER_BLOCK.min(rows - first);
+        let first = block * ROWS_PER_TASK;
+        let last = (first + ROWS_PER_TASK).min(rows);
         let output = output.from(first, 0);
         let mut copy = Vec::new();
         for start in (0..inner).step_by(TERMS_PER_BLOCK) {
             let terms = start..(start + TERMS_PER_BLOCK).min(inner);
-            // SAFETY: a block of the promised matrices; no other task has these rows.
-            unsafe {
-                let lhs = along_rows(lhs.from(first, start), count, terms.len(), &mut copy);
-                right.multiply(lhs, count, terms, output, add || start > 0);
-            }
+            let lhs = along_rows(lhs.block(first..last, terms.clone()), &mut copy);
+            // SAFETY: a block of the output; no other task has these rows.
+            unsafe { right.multiply(lhs, terms, output, add || start > 0) };
         }
     };
-    for_each(rows.div_ceil(ROWS_PER_BLOCK), threads, block);
+    for_each(rows.div_ceil(ROWS_PER_TASK), threads, block);
 }
 
 /// A small result of long sums, the gradient of a weight matrix: every task computes a block of the result.
@@ -110,13 +94,13 @@ unsafe fn write_rows(
 /// # Safety
 /// As [`write_rows`].
 unsafe fn write_long_sums(
-    lhs: StridedMatrix,
-    rhs: StridedMatrix,
+    lhs: MatrixView<'_>,
+    rhs: MatrixView<'_>,
     output: OutputBlock,
-    [rows, inner, columns]: [usize; 3],
     add: bool,
     threads: usize,
 ) {
+    let [rows, inner, columns] = [lhs.rows(), lhs.columns(), rhs.columns()];
     // As many blocks as threads, of whole tiles: how the result is cut changes no bit.
     let column_blocks = threads.min(columns.div_ceil(32));
     let row_blocks = (threads / column_blocks).clamp(1, rows.div_ceil(24));
@@ -127,18 +111,16 @@ unsafe fn write_long_sums(
     let column_blocks = columns.div_ceil(width);
     let block = |block: usize| {
         let (row, column) = (block / column_blocks * height, block % column_blocks * width);
-        let (height, width) = (height.min(rows - row), width.min(columns - column));
+        let (row_end, column_end) = ((row + height).min(rows), (column + width).min(columns));
         let (mut right, mut copy) = (RightFactor::default(), Vec::new());
         for start in (0..inner).step_by(TERMS_PER_COPY) {
-            let terms = TERMS_PER_COPY.min(inner - start);
-            // SAFETY: a block of the promised matrices; no other task has this part of the output.
-            unsafe {
-                right.fill(rhs.from(start, column), [terms, width]);
-                for first in (row..row + height).step_by(ROWS_PER_BLOCK) {
-                    let count = ROWS_PER_BLOCK.min(row + height - first);
-                    let lhs = along_rows(lhs.from(first, start), count, terms, &mut copy);
-                    right.multiply(lhs, count, 0..terms, output.from(first, column), add || start > 0);
-                }
+            let terms = start..(start + TERMS_PER_COPY).min(inner);
+            right.fill(rhs.block(terms.clone(), column..column_end));
+            for first in (row..row_end).step_by(ROWS_PER_TASK) {
+                let last = (first + ROWS_PER_TASK).min(row_end);
+                let lhs = along_rows(lhs.block(first..last, terms.clone()), &mut copy);
+                // SAFETY: a block of the output; no other task has this part.
+                unsafe { right.multiply(lhs, 0..terms.len(), output.from(first, column), add || start > 0) };
             }
         }
     };
@@ -146,24 +128,16 @@ unsafe fn write_long_sums(
 }
 
 /// A block whose elements lie close together: itself, or a copy if its columns are contiguous instead of its rows.
-///
-/// # Safety
-/// `block` has `[rows, terms]` elements, and so many can be read from every column.
-unsafe fn along_rows(block: StridedMatrix, rows: usize, terms: usize, copy: &mut Vec<f32>) -> StridedMatrix {
-    if block.column_stride == 1 {
+fn along_rows<'a>(block: MatrixView<'a>, copy: &'a mut Vec<f32>) -> MatrixView<'a> {
+    let [row_stride, column_stride] = block.strides();
+    if column_stride == 1 || block.rows() == 1 {
         return block;
     }
-    if rows == 1 {
-        // There is no step to another row.
-        return StridedMatrix { row_stride: 1, ..block };
-    }
-    assert_eq!(block.row_stride, 1, "neither rows nor columns of a left factor are contiguous");
+    assert_eq!(row_stride, 1, "neither rows nor columns of a left factor are contiguous");
     copy.clear();
-    for term in 0..terms {
-        // SAFETY: a column of the block.
-        copy.extend_from_slice(unsafe { std::slice::from_raw_parts(block.from(0, term).first, rows) });
-    }
-    StridedMatrix::of_rows(copy, rows).transposed()
+    let columns = block.transposed();
+    (0..columns.rows()).for_each(|column| copy.extend_from_slice(columns.row(column)));
+    MatrixView::of_rows(copy, block.rows()).transposed()
 }
 
 fn for_each(tasks: usize, threads: usize, run: impl Fn(usize) + Send + Sync) {
@@ -176,8 +150,6 @@ fn for_each(tasks: usize, threads: usize, run: impl Fn(usize) + Send + Sync) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use burn::backend::ops::FloatTensorOps;
-    use burn::tensor::TensorData;
 
     /// Rows, terms, columns: small, tall, long sums, both wide; sizes that no block divides, and several blocks of terms.
     const SIZES: [[usize; 3]; 10] = [
@@ -202,28 +174,24 @@ mod tests {
         (0..count).map(|_| next()).collect()
     }
 
-    fn matrix(values: &[f32], rows: usize, columns: usize) -> FloatTensor<Flex> {
-        FloatTensor::<Flex>::from_data(TensorData::new(values.to_vec(), [rows, columns]))
-    }
-
     #[test]
     fn every_partition_matches_sums_in_double_precision_for_any_number_of_threads() {
         for [rows, inner, columns] in SIZES {
             let (a, b, c) = (values(rows * inner, 1), values(inner * columns, 2), values(rows * columns, 3));
-            let (lhs, rhs) = (matrix(&a, rows, inner), matrix(&b, inner, columns));
+            let (lhs, rhs) = (MatrixView::of_rows(&a, inner), MatrixView::of_rows(&b, columns));
             // The left factor of a weight's gradient is a transposed view.
             let turned: Vec<f32> = (0..inner * rows).map(|i| a[(i % rows) * inner + i / rows]).collect();
-            let turned = Flex::float_swap_dims(matrix(&turned, inner, rows), 0, 1);
+            let turned = MatrixView::of_rows(&turned, rows).transposed();
             // The right one of the gradient of a factor is too.
             let turned_rhs: Vec<f32> =
                 (0..inner * columns).map(|i| b[(i % inner) * columns + i / inner]).collect();
-            let turned_rhs = Flex::float_swap_dims(matrix(&turned_rhs, columns, inner), 0, 1);
+            let turned_rhs = MatrixView::of_rows(&turned_rhs, inner).transposed();
             let run = |threads: usize| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| {
                     let mut sum = c.clone();
-                    add_product(&turned, &rhs, &mut sum);
-                    [product(&lhs, &turned_rhs), sum]
+                    add_product(turned, rhs, &mut sum);
+                    [product(lhs, turned_rhs), sum]
                 })
             };
             let found = run(1);
@@ -245,8 +213,8 @@ mod tests {
 
     #[test]
     fn what_is_not_a_number_stays_visible() {
-        let lhs = matrix(&[1.0, f32::NAN, f32::MAX, 1.0, 2.0, 3.0], 2, 3);
-        let found = product(&lhs, &matrix(&[2.0, 1.0, 4.0], 3, 1));
+        let lhs = MatrixView::of_rows(&[1.0, f32::NAN, f32::MAX, 1.0, 2.0, 3.0], 3);
+        let found = product(lhs, MatrixView::of_rows(&[2.0, 1.0, 4.0], 1));
         assert!(found[0].is_nan());
         assert_eq!(found[1], 16.0, "in the other row");
     }

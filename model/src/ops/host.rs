@@ -2,16 +2,15 @@
 
 use std::mem::MaybeUninit;
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use burn::backend::Backend;
 use burn::backend::tensor::FloatTensor;
-use burn::tensor::TensorData;
+use burn::tensor::{Device, Tensor, TensorData};
 use rayon::prelude::*;
 
-use super::composed::multiply_add;
+use super::instruction_set::vectorised;
+use super::matrix_view::MatrixView;
 use super::tensors::Tensors;
-use super::tile::StridedMatrix;
 use crate::packing::Packing;
 
 #[cfg(feature = "flex")]
@@ -22,30 +21,21 @@ mod ndarray;
 /// Elements one task works on: about a second-level cache, so that small tensors stay on one thread.
 pub(super) const CHUNK_ELEMENTS: usize = 1 << 14;
 
-/// A backend whose tensors can be read in place.
+/// A backend whose tensors lie in host memory. All are f32.
 pub(super) trait HostBackend: Backend {
-    /// A tensor held in a layout with contiguous rows.
-    type Held: Send + Sync;
+    /// A matrix with contiguous rows, copied only if its own are not.
+    fn hold(matrix: FloatTensor<Self>) -> FloatTensor<Self>;
 
-    /// Holds a matrix for reading, copying only if its rows are not contiguous.
-    fn hold(tensor: FloatTensor<Self>) -> Self::Held;
+    /// Read access to a matrix that is [held](Self::hold).
+    fn view(held: &FloatTensor<Self>) -> MatrixView<'_>;
 
-    /// Read access to a held matrix.
-    fn view(held: &Self::Held) -> MatrixView<'_>;
-
-    /// All elements of a tensor of any shape in row-major order, which is made so if it is not. `None` if the elements are
-    /// not f32 or the backend does not lend them.
-    fn values(_tensor: &mut FloatTensor<Self>) -> Option<&[f32]> {
-        None
-    }
+    /// All elements of a tensor of any shape in row-major order, which is made so if it is not.
+    fn values(tensor: &mut FloatTensor<Self>) -> &[f32];
 
     /// The same for writing in place; memory that is shared is copied first.
-    fn values_mut(_tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
-        None
-    }
+    fn values_mut(tensor: &mut FloatTensor<Self>) -> &mut [f32];
 
-    /// The elements of a matrix whose memory no other tensor shares and that fills its memory, for writing in place; `None`
-    /// otherwise, or if they are not f32.
+    /// The elements of a matrix whose memory no other tensor shares and that fills its memory, for writing in place.
     fn own_values_mut(_tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
         None
     }
@@ -56,7 +46,11 @@ pub(super) trait HostBackend: Backend {
         rhs: FloatTensor<Self>,
         addend: Option<FloatTensor<Self>>,
     ) -> FloatTensor<Self> {
-        multiply_add::<Self>(lhs, rhs, addend)
+        let product = Self::float_matmul(lhs, rhs);
+        match addend {
+            Some(addend) => Self::float_add(product, addend),
+            None => product,
+        }
     }
 
     /// A matrix from its elements.
@@ -67,33 +61,16 @@ pub(super) trait HostBackend: Backend {
     }
 }
 
-/// Read access to a matrix whose rows are contiguous.
-#[derive(Clone, Copy)]
-pub(super) struct MatrixView<'a> {
-    values: &'a [f32],
-    row_stride: usize,
-    columns: usize,
-    rows: usize,
-}
-
-impl<'a> MatrixView<'a> {
-    pub(super) fn columns(&self) -> usize {
-        self.columns
-    }
-
-    pub(super) fn rows(&self) -> usize {
-        self.rows
-    }
-
-    /// The matrix as a factor of a product.
-    pub(super) fn strided(&self) -> StridedMatrix {
-        StridedMatrix { first: self.values.as_ptr(), row_stride: self.row_stride as isize, column_stride: 1 }
-    }
-
-    #[inline(always)]
-    pub(super) fn row(&self, row: usize) -> &'a [f32] {
-        &self.values[row * self.row_stride..row * self.row_stride + self.columns]
-    }
+/// Whether a tensor lies in host memory.
+pub fn lies_on_host<const D: usize>(tensor: &Tensor<D>) -> bool {
+    #[allow(deprecated)]
+    let hosts: &[Device] = &[
+        #[cfg(feature = "flex")]
+        Device::flex(),
+        #[cfg(feature = "ndarray")]
+        Device::ndarray(),
+    ];
+    hosts.contains(&tensor.device().inner())
 }
 
 /// A run of rows inside one garment.
@@ -132,109 +109,94 @@ pub(super) fn compute<B: HostBackend, const K: usize>(
     kernel: impl Fn(&Chunk, [&mut [f32]; K]) + Sync,
 ) -> Tensors<B> {
     let chunks = chunks(packing, columns);
-    let lengths = |output| {
-        let length = |chunk: &Chunk| match output {
-            OutputMatrix::Rows(columns) => chunk.rows.len() * columns,
-            OutputMatrix::Sums(columns) => columns,
-        };
-        chunks.iter().map(length).collect()
-    };
-    let mut matrices = outputs.map(|output| (output, NewValues::new(lengths(output))));
+    let mut matrices = outputs.map(|output| match output {
+        OutputMatrix::Rows(columns) => (output, NewValues::of_rows(&chunks, columns)),
+        OutputMatrix::Sums(columns) => (output, NewValues::new(vec![columns; chunks.len()])),
+    });
     let mut parts = matrices.each_mut().map(|(_, values)| values.parts().into_iter());
     let mut next = || parts.each_mut().map(|parts| parts.next().expect("every chunk has a part"));
     let tasks = chunks.iter().map(|chunk| (chunk, next())).collect();
     for_each(tasks, |(chunk, parts)| {
-        let parts = parts.map(NewPart::zeroed);
+        let parts = parts.map(zeroed);
         vectorised(
             #[inline(always)]
             || kernel(chunk, parts),
         );
     });
-    let matrix = |(output, values): (OutputMatrix, NewValues)| match output {
-        OutputMatrix::Rows(columns) => B::matrix(values.finish(), columns),
-        OutputMatrix::Sums(columns) => {
-            let sums = sum_partials(&values.finish(), &chunks, columns, packing.count());
-            B::matrix(sums, columns)
+    let matrix = |(output, values): (OutputMatrix, NewValues)| {
+        // SAFETY: every part has been filled with zeros at least.
+        let values = unsafe { values.finish() };
+        match output {
+            OutputMatrix::Rows(columns) => B::matrix(values, columns),
+            OutputMatrix::Sums(columns) => {
+                B::matrix(sum_partials(&values, &chunks, columns, packing.count()), columns)
+            }
         }
     };
     matrices.map(matrix).into()
 }
 
-/// The part of `values` (rows of `columns` elements) that belongs to each chunk.
-pub(super) fn split_mut<'a>(
-    mut values: &'a mut [f32],
-    chunks: &[Chunk],
-    columns: usize,
-) -> Vec<&'a mut [f32]> {
-    let next = |chunk: &Chunk| {
-        let (part, rest) = std::mem::take(&mut values).split_at_mut(chunk.rows.len() * columns);
-        values = rest;
-        part
-    };
-    chunks.iter().map(next).collect()
-}
-
-/// Elements of a new matrix. Its memory is not zeroed in one pass before the work: the task that computes a part zeroes
+/// The elements of a new matrix. Its memory is not zeroed in one pass before the work: the task that computes a part writes
 /// that part, in its own cache and in parallel with the others.
 pub(super) struct NewValues {
     values: Vec<f32>,
     lengths: Vec<usize>,
-    written: AtomicUsize,
-}
-
-/// A run of elements of [`NewValues`].
-pub(super) struct NewPart<'a> {
-    memory: &'a mut [MaybeUninit<f32>],
-    written: &'a AtomicUsize,
 }
 
 impl NewValues {
     /// Consecutive parts of the given lengths.
     pub(super) fn new(lengths: Vec<usize>) -> Self {
-        Self { values: Vec::with_capacity(lengths.iter().sum()), lengths, written: AtomicUsize::new(0) }
+        Self { values: Vec::with_capacity(lengths.iter().sum()), lengths }
     }
 
-    /// The parts, to be written once.
-    pub(super) fn parts(&mut self) -> Vec<NewPart<'_>> {
-        *self.written.get_mut() = 0;
-        let written = &self.written;
-        let mut memory = self.values.spare_capacity_mut();
-        let next = |length: &usize| {
-            let (part, rest) = std::mem::take(&mut memory).split_at_mut(*length);
-            memory = rest;
-            NewPart { memory: part, written }
-        };
-        self.lengths.iter().map(next).collect()
+    /// A part for the rows of every chunk.
+    pub(super) fn of_rows(chunks: &[Chunk], columns: usize) -> Self {
+        Self::new(chunks.iter().map(|chunk| chunk.rows.len() * columns).collect())
     }
 
-    /// The elements, once every part has been written.
-    pub(super) fn finish(mut self) -> Vec<f32> {
-        let count = self.lengths.iter().sum();
-        assert_eq!(*self.written.get_mut(), count, "every part of a matrix is written");
-        // SAFETY: parts do not overlap and each counts its elements once, when they have been written: all have been.
-        unsafe { self.values.set_len(count) };
+    /// The parts, to be written.
+    pub(super) fn parts(&mut self) -> Vec<&mut [MaybeUninit<f32>]> {
+        split_mut(self.values.spare_capacity_mut(), self.lengths.iter().copied())
+    }
+
+    /// The elements.
+    ///
+    /// # Safety
+    /// Every part has been written.
+    pub(super) unsafe fn finish(mut self) -> Vec<f32> {
+        // SAFETY: promised.
+        unsafe { self.values.set_len(self.lengths.iter().sum()) };
         self.values
     }
 }
 
-impl<'a> NewPart<'a> {
-    /// Memory to be written.
-    ///
-    /// # Safety
-    /// The caller writes all of it.
-    pub(super) unsafe fn unwritten(self) -> &'a mut [MaybeUninit<f32>] {
-        self.written.fetch_add(self.memory.len(), Ordering::Relaxed);
-        self.memory
-    }
+/// Consecutive parts of the given lengths.
+pub(super) fn split_mut<T>(mut values: &mut [T], lengths: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
+    let next = |length| values.split_off_mut(..length).expect("parts within the whole");
+    lengths.map(next).collect()
+}
 
-    #[inline(always)]
-    pub(super) fn zeroed(self) -> &'a mut [f32] {
-        self.memory.fill(MaybeUninit::new(0.0));
-        self.written.fetch_add(self.memory.len(), Ordering::Relaxed);
-        let length = self.memory.len();
-        // SAFETY: the elements have just been written, and the borrow is the part's own.
-        unsafe { std::slice::from_raw_parts_mut(self.memory.as_mut_ptr().cast::<f32>(), length) }
+/// Memory filled with zeros.
+#[inline(always)]
+pub(super) fn zeroed(memory: &mut [MaybeUninit<f32>]) -> &mut [f32] {
+    memory.fill(MaybeUninit::new(0.0));
+    // SAFETY: the elements have just been written.
+    unsafe { memory.assume_init_mut() }
+}
+
+/// Memory filled with rows, one after another.
+pub(super) fn filled<'m, 'r>(
+    memory: &'m mut [MaybeUninit<f32>],
+    rows: impl Iterator<Item = &'r [f32]>,
+) -> &'m mut [f32] {
+    let mut end = 0;
+    for row in rows {
+        memory[end..end + row.len()].write_copy_of_slice(row);
+        end += row.len();
     }
+    assert_eq!(end, memory.len(), "rows that fill the memory");
+    // SAFETY: all elements have just been written.
+    unsafe { memory.assume_init_mut() }
 }
 
 /// Runs one task per chunk; a single one stays on this thread.
@@ -244,21 +206,6 @@ pub(super) fn for_each<T: Send>(tasks: Vec<T>, run: impl Fn(T) + Send + Sync) {
     } else {
         tasks.into_par_iter().for_each(run);
     }
-}
-
-/// Compiles a kernel for every instruction set and runs the best one this CPU has.
-///
-/// The closure's body must be inlined into the caller: mark it and what it calls `#[inline(always)]`.
-#[inline(always)]
-pub(super) fn vectorised<R>(kernel: impl FnOnce() -> R) -> R {
-    // Named instruction sets instead of `pulp::Arch::dispatch`, through which a kernel is not inlined and stays narrow.
-    #[cfg(target_arch = "x86_64")]
-    if let Some(simd) = pulp::x86::V4::try_new() {
-        return simd.vectorize(kernel);
-    } else if let Some(simd) = pulp::x86::V3::try_new() {
-        return simd.vectorize(kernel);
-    }
-    kernel()
 }
 
 /// Adds the rows of `partial` (one per chunk) into one row per garment, in chunk order, in f64.

@@ -2,15 +2,16 @@
 //!
 //! They are inlined into kernels compiled once per instruction set, where `mul_add` is one instruction.
 
+/// 1.5·2²³: adding and subtracting it rounds to the nearest integer.
+const TO_INTEGER: f32 = 12_582_912.0;
+
 /// Sine and cosine, absolute error below 1.5e-7 for |x| < 10⁴; accuracy fades slowly beyond, NaN stays NaN.
 ///
 /// Reduction by multiples of π/2 in three parts (Cody and Waite), then the minimax polynomials of Cephes on ±π/4.
 #[inline(always)]
 pub(super) fn sin_cos(x: f32) -> (f32, f32) {
-    // Adding and subtracting 1.5·2²³ rounds to the nearest integer.
-    const ROUND: f32 = 12_582_912.0;
-    let rounded = x * std::f32::consts::FRAC_2_PI + ROUND;
-    let quotient = rounded - ROUND;
+    let rounded = x * std::f32::consts::FRAC_2_PI + TO_INTEGER;
+    let quotient = rounded - TO_INTEGER;
     let remainder = quotient.mul_add(-1.570_312_5, x);
     let remainder = quotient.mul_add(-4.837_513e-4, remainder);
     let remainder = quotient.mul_add(-7.549_79e-8, remainder);
@@ -34,10 +35,9 @@ pub(super) fn sin_cos(x: f32) -> (f32, f32) {
 /// e^x, relative error below 2e-7; flushes to zero below −87 and saturates above 88.
 #[inline(always)]
 pub(super) fn exp(x: f32) -> f32 {
-    const ROUND: f32 = 12_582_912.0;
     let clamped = x.clamp(-87.0, 88.0);
-    let rounded = clamped.mul_add(std::f32::consts::LOG2_E, ROUND);
-    let power = rounded - ROUND;
+    let rounded = clamped.mul_add(std::f32::consts::LOG2_E, TO_INTEGER);
+    let power = rounded - TO_INTEGER;
     let rest = power.mul_add(-0.693_145_75, clamped);
     let rest = power.mul_add(-1.428_606_8e-6, rest);
     let series = 1.378_059_4e-3_f32

@@ -3,68 +3,41 @@
 //! A block of rows goes through all layers before the next one, so that what the layers hand on stays in a core's caches.
 //! The backward pass reads the phases and the gates of the forward pass and computes the rest again.
 
-use burn::backend::Backend;
-use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
-use super::host::{HostBackend, MatrixView};
-use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
-use super::row_blocks::{HOST_ONLY, factor, square_factors, transposed_factor};
+use super::host::HostBackend;
+use super::operation::{Operation, Saves, TensorKernel, apply};
 use super::tensors::Tensors;
-use super::tile::RightFactor;
 use crate::packing::Packing;
 
 mod backward;
 mod forward;
+mod weights;
 
-/// What a modulated SIREN of L > 1 layers with W units is applied to, and its parameters.
-pub struct SirenArguments {
-    /// Coordinates `[N,I]`.
-    pub coordinates: Tensor<2>,
-    /// Part of the gates' arguments that every row has for itself `[N,L·W]`.
-    pub vertex_product: Tensor<2>,
-    /// Part of the gates' arguments that the rows of a garment share, with the biases `[M,L·W]`.
-    pub rows: Tensor<2>,
-    /// Weights between the gates, one below the other `[(L−1)·W,W]`.
-    pub gate_weights: Tensor<2>,
-    /// Weight of the first sine layer `[I,W]`.
-    pub first_weight: Tensor<2>,
-    /// Weights of the other sine layers, one below the other `[(L−1)·W,W]`.
-    pub sine_weights: Tensor<2>,
-    /// Biases of the sine layers, side by side `[1,L·W]`.
-    pub sine_biases: Tensor<2>,
-    /// Weight of the output layer `[W,O]`.
-    pub output_weight: Tensor<2>,
-    /// Bias of the output layer `[1,O]`.
-    pub output_bias: Tensor<2>,
-}
-
-/// Values `[N,O]`, where the tensors [lie in host memory](super::runs_on_host).
+/// Values `[N,O]` of a modulated SIREN of L > 1 layers with W units, where the tensors
+/// [lie in host memory](super::lies_on_host). `omegas` are the w0 of the first and of the other layers. Arguments:
+///
+/// - coordinates `[N,I]`;
+/// - the part of the gates' arguments that every row has for itself `[N,L·W]`;
+/// - the part that the rows of a garment share, with the biases `[M,L·W]`;
+/// - weights between the gates, one below the other `[(L−1)·W,W]`;
+/// - weight of the first sine layer `[I,W]`;
+/// - weights of the other sine layers, one below the other `[(L−1)·W,W]`;
+/// - biases of the sine layers, side by side `[1,L·W]`;
+/// - weight of the output layer `[W,O]`, and its bias `[1,O]`.
 pub fn modulated_siren(
-    arguments: SirenArguments,
+    arguments: [Tensor<2>; 9],
     [omega_first, omega_hidden]: [f64; 2],
     packing: &Packing,
 ) -> Tensor<2> {
-    let a = arguments;
-    let layers = a.gate_weights.dims()[0] / a.gate_weights.dims()[1] + 1;
+    let [_, _, _, gate_weights, ..] = &arguments;
+    let layers = gate_weights.dims()[0] / gate_weights.dims()[1] + 1;
     let mut omegas = vec![omega_hidden as f32; layers];
     omegas[0] = omega_first as f32;
-    let operation = ModulatedSirenLayers { omegas, packing: packing.clone(), recorded: false };
-    let arguments = [
-        a.coordinates,
-        a.vertex_product,
-        a.rows,
-        a.gate_weights,
-        a.first_weight,
-        a.sine_weights,
-        a.sine_biases,
-        a.output_weight,
-        a.output_bias,
-    ];
-    apply(operation, arguments)
+    apply(ModulatedSirenLayers { omegas, packing: packing.clone(), recorded: false }, arguments)
 }
 
-/// Arguments in the order of [`SirenArguments`].
+/// Arguments of [`modulated_siren`].
 #[derive(Clone, Debug)]
 struct ModulatedSirenLayers {
     /// w0 of every layer.
@@ -74,39 +47,9 @@ struct ModulatedSirenLayers {
     recorded: bool,
 }
 
-/// Right factors of the products of a pass.
-struct Weights {
-    gates: Vec<RightFactor>,
-    first: RightFactor,
-    sines: Vec<RightFactor>,
-    output: RightFactor,
-}
-
-impl Weights {
-    /// Of the weights between gates, of the first sine layer, of the others and of the output layer.
-    fn new([gates, first, sines, output]: [MatrixView<'_>; 4], transposed: bool) -> Self {
-        let factor = if transposed { transposed_factor } else { factor };
-        Self {
-            gates: square_factors(gates, transposed),
-            first: factor(first),
-            sines: square_factors(sines, transposed),
-            output: factor(output),
-        }
-    }
-
-    /// Of sine layer `layer`, counted from 0.
-    fn sine(&self, layer: usize) -> &RightFactor {
-        layer.checked_sub(1).map_or(&self.first, |hidden| &self.sines[hidden])
-    }
-}
-
 impl TensorKernel for ModulatedSirenLayers {
-    fn composed<B: Backend>(&self, _: Tensors<B>) -> Tensors<B> {
-        unreachable!("{HOST_ONLY}")
-    }
-
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        forward::run::<B>(self, arguments.take())
+        forward::run::<B>(&self.omegas, &self.packing, self.recorded, arguments.take())
     }
 }
 
@@ -115,25 +58,12 @@ impl Operation<9> for ModulatedSirenLayers {
         Self { recorded: true, ..self }
     }
 
+    /// Coordinates and weights.
     fn saves(&self, _: [bool; 9]) -> Saves<9> {
         Saves { arguments: [true, false, false, true, true, true, false, true, false], result: false }
     }
 
-    fn backward<B: FusedOps>(&self, saved: Saved<B, 9>, gradient: FloatTensor<B>) -> ArgumentGradients<B, 9> {
-        B::run(&SirenGradients(self.clone()), saved.with(gradient)).take().map(Some)
-    }
-}
-
-/// Gradients of all arguments from coordinates, weights, phases, gates and the gradient of the result.
-#[derive(Clone, Debug)]
-struct SirenGradients(ModulatedSirenLayers);
-
-impl TensorKernel for SirenGradients {
-    fn composed<B: Backend>(&self, _: Tensors<B>) -> Tensors<B> {
-        unreachable!("{HOST_ONLY}")
-    }
-
-    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        backward::run::<B>(&self.0, arguments.take())
+    fn gradients_on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        backward::run::<B>(&self.omegas, &self.packing, arguments.take())
     }
 }

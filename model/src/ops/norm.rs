@@ -1,20 +1,21 @@
 //! Squared norm and scaling of a gradient, each one pass over memory.
 
 #[cfg(feature = "gpu")]
-use super::gpu;
-#[cfg(feature = "gpu")]
 use burn::backend::Cube;
+use burn::backend::DispatchTensor;
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, DispatchTensor, TensorMetadata};
 use burn::tensor::{Shape, Tensor, TensorData};
 use rayon::prelude::*;
 
-use super::host::{CHUNK_ELEMENTS, HostBackend, vectorised};
+#[cfg(feature = "gpu")]
+use super::gpu;
+use super::host::{CHUNK_ELEMENTS, HostBackend};
+use super::instruction_set::vectorised;
 use super::operation::{TensorKernel, run};
 use super::tensors::Tensors;
 
 /// Lanes that add up in parallel; their sums are added in order.
-const LANES: usize = 16;
+const SUM_LANES: usize = 16;
 
 /// Sum `[1]` of the squares of all entries of some tensors; not tracked by autodiff.
 ///
@@ -34,38 +35,20 @@ pub fn scale_by<const D: usize>(values: Tensor<D>, factor: Tensor<1>) -> Tensor<
 struct SquaredNorm;
 
 impl TensorKernel for SquaredNorm {
-    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        [sum::<B>(arguments.0.into_iter().map(squares::<B>).collect())].into()
-    }
-
     #[cfg(feature = "gpu")]
     fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
         [gpu::squared_norm(arguments.0)].into()
     }
 
-    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        [sum::<B>(arguments.0.into_iter().map(squares_on_host::<B>).collect())].into()
+    fn on_host<B: HostBackend>(&self, Tensors(tensors): Tensors<B>) -> Tensors<B> {
+        let sums = tensors.into_iter().map(squares_on_host::<B>).collect();
+        [B::float_reshape(B::float_sum(B::float_cat(sums, 0)), Shape::new([1]))].into()
     }
 }
 
-/// The sum `[1]` of several sums `[1]`.
-fn sum<B: Backend>(parts: Vec<FloatTensor<B>>) -> FloatTensor<B> {
-    B::float_reshape(B::float_sum(B::float_cat(parts, 0)), Shape::new([1]))
-}
-
 /// Sum of squares `[1]`.
-fn squares<B: Backend>(values: FloatTensor<B>) -> FloatTensor<B> {
-    // Row sums first: one running sum over a large weight would lose digits in f32.
-    let shape = values.shape();
-    let columns = shape[shape.num_dims() - 1].max(1);
-    let rows = shape.num_elements() / columns;
-    let squares = B::float_reshape(B::float_mul(values.clone(), values), Shape::new([rows, columns]));
-    B::float_reshape(B::float_sum(B::float_sum_dim(squares, 1)), Shape::new([1]))
-}
-
 fn squares_on_host<B: HostBackend>(mut tensor: FloatTensor<B>) -> FloatTensor<B> {
-    let Some(values) = B::values(&mut tensor) else { return squares::<B>(tensor) };
-    let parts: Vec<f64> = values
+    let parts: Vec<f64> = B::values(&mut tensor)
         .par_chunks(CHUNK_ELEMENTS)
         .map(|chunk| {
             vectorised(
@@ -80,10 +63,10 @@ fn squares_on_host<B: HostBackend>(mut tensor: FloatTensor<B>) -> FloatTensor<B>
 
 #[inline(always)]
 fn sum_of_squares(values: &[f32]) -> f64 {
-    let mut sums = [0.0_f64; LANES];
-    let (lines, rest) = values.as_chunks::<LANES>();
+    let mut sums = [0.0_f64; SUM_LANES];
+    let (lines, rest) = values.as_chunks::<SUM_LANES>();
     for line in lines {
-        for lane in 0..LANES {
+        for lane in 0..SUM_LANES {
             let value = f64::from(line[lane]);
             sums[lane] += value * value;
         }
@@ -96,12 +79,6 @@ fn sum_of_squares(values: &[f32]) -> f64 {
 struct ScaleBy;
 
 impl TensorKernel for ScaleBy {
-    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let [values, factor] = arguments.take();
-        let ones = vec![1; values.shape().num_dims()];
-        [B::float_mul(values, B::float_reshape(factor, Shape::from(ones)))].into()
-    }
-
     #[cfg(feature = "gpu")]
     fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
         let [values, factor] = arguments.take();
@@ -110,10 +87,8 @@ impl TensorKernel for ScaleBy {
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [mut tensor, mut factor] = arguments.take();
-        let (Some(values), Some(&[by])) = (B::values_mut(&mut tensor), B::values(&mut factor)) else {
-            return self.composed([tensor, factor].into());
-        };
-        values.par_chunks_mut(CHUNK_ELEMENTS).for_each(|chunk| {
+        let by = B::values(&mut factor)[0];
+        B::values_mut(&mut tensor).par_chunks_mut(CHUNK_ELEMENTS).for_each(|chunk| {
             vectorised(
                 #[inline(always)]
                 || {

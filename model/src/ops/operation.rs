@@ -24,22 +24,23 @@ use burn::tensor::Tensor;
 use super::host::HostBackend;
 use super::tensors::Tensors;
 
-/// A function of tensors in three forms, which agree to rounding (products on matrix units: to 2⁻¹⁵ of a term; in bf16: to 2⁻⁷).
+/// A function of f32 tensors, in a form for every kind of memory that it is called for. All forms agree to rounding (products
+/// on matrix units: to 2⁻¹⁵ of a term).
 pub(super) trait TensorKernel {
-    /// Composed of a backend's own operations.
-    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B>;
-
-    /// On f32 in the memory of a GPU, in few kernels.
+    /// In the memory of a GPU, in few kernels.
     #[cfg(feature = "gpu")]
-    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
-        self.composed(arguments)
+    fn on_gpu(&self, _: Tensors<Cube>) -> Tensors<Cube> {
+        unreachable!("{OTHER_MEMORY}")
     }
 
-    /// On f32 in host memory, in one pass.
-    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        self.composed(arguments)
+    /// In host memory, in one pass.
+    fn on_host<B: HostBackend>(&self, _: Tensors<B>) -> Tensors<B> {
+        unreachable!("{OTHER_MEMORY}")
     }
 }
+
+/// Why a form is missing.
+const OTHER_MEMORY: &str = "callers ask `lies_on_host`; elsewhere they compose other operations";
 
 /// A kernel with one result and a derivative by its N arguments.
 pub(super) trait Operation<const N: usize>: TensorKernel + Clone + Debug + Send + 'static {
@@ -54,8 +55,35 @@ pub(super) trait Operation<const N: usize>: TensorKernel + Clone + Debug + Send 
         Saves { arguments: [false; N], result: false }
     }
 
+    /// [`TensorKernel::on_gpu`] of the backward pass, from [`Saved::with`] the gradient of the result to those of the arguments.
+    #[cfg(feature = "gpu")]
+    fn gradients_on_gpu(&self, _: Tensors<Cube>) -> Tensors<Cube> {
+        unreachable!("{OTHER_MEMORY}")
+    }
+
+    /// [`TensorKernel::on_host`] of the backward pass.
+    fn gradients_on_host<B: HostBackend>(&self, _: Tensors<B>) -> Tensors<B> {
+        unreachable!("{OTHER_MEMORY}")
+    }
+
     /// Gradients of the arguments.
-    fn backward<B: FusedOps>(&self, saved: Saved<B, N>, gradient: FloatTensor<B>) -> ArgumentGradients<B, N>;
+    fn backward<B: FusedOps>(&self, saved: Saved<B, N>, gradient: FloatTensor<B>) -> ArgumentGradients<B, N> {
+        B::run(&BackwardPass(self), saved.with(gradient)).take().map(Some)
+    }
+}
+
+/// The backward pass of an operation as a kernel.
+pub(super) struct BackwardPass<'a, O, const N: usize>(pub(super) &'a O);
+
+impl<O: Operation<N>, const N: usize> TensorKernel for BackwardPass<'_, O, N> {
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        self.0.gradients_on_gpu(arguments)
+    }
+
+    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        self.0.gradients_on_host(arguments)
+    }
 }
 
 /// Gradient of every argument; `None` for a constant.
@@ -87,12 +115,14 @@ impl<B: Backend, const N: usize> Saved<B, N> {
 /// Runs an operation, and records it if one of the arguments is tracked.
 pub(super) fn apply<O: Operation<N>, const N: usize>(operation: O, arguments: [Tensor<2>; N]) -> Tensor<2> {
     let arguments = Tensors::from(arguments.map(Tensor::into_dispatch));
+    arguments.assert_f32();
     let [result] = Dispatch::apply::<O, N>(operation, arguments).take();
     Tensor::from_dispatch(result)
 }
 
 /// Runs a kernel and records nothing.
 pub(super) fn run(kernel: &impl TensorKernel, arguments: Tensors<Dispatch>) -> Tensors<Dispatch> {
+    arguments.assert_f32();
     Dispatch::run(kernel, arguments)
 }
 
@@ -105,9 +135,7 @@ pub(super) fn run(kernel: &impl TensorKernel, arguments: Tensors<Dispatch>) -> T
 )]
 pub(super) trait FusedOps: Backend {
     /// See [`run`].
-    fn run<K: TensorKernel>(kernel: &K, #[extension_type] arguments: Tensors<Self>) -> Tensors<Self> {
-        kernel.composed(arguments)
-    }
+    fn run<K: TensorKernel>(kernel: &K, #[extension_type] arguments: Tensors<Self>) -> Tensors<Self>;
 
     /// See [`apply`].
     fn apply<O: Operation<N>, const N: usize>(
@@ -116,42 +144,26 @@ pub(super) trait FusedOps: Backend {
     ) -> Tensors<Self> {
         Self::run(&operation, arguments)
     }
-
-    /// The composed form, whose operations an autodiff backend records one by one.
-    #[cfg(test)]
-    fn compose<K: TensorKernel>(kernel: &K, #[extension_type] arguments: Tensors<Self>) -> Tensors<Self> {
-        kernel.composed(arguments)
-    }
 }
 
 #[cfg(feature = "flex")]
 impl FusedOps for Flex {
     fn run<K: TensorKernel>(kernel: &K, arguments: Tensors<Self>) -> Tensors<Self> {
-        run_on_host(kernel, arguments)
+        kernel.on_host(arguments)
     }
 }
 
 #[cfg(feature = "ndarray")]
 impl FusedOps for NdArray {
     fn run<K: TensorKernel>(kernel: &K, arguments: Tensors<Self>) -> Tensors<Self> {
-        run_on_host(kernel, arguments)
+        kernel.on_host(arguments)
     }
 }
 
 #[cfg(feature = "gpu")]
 impl FusedOps for Cube {
     fn run<K: TensorKernel>(kernel: &K, arguments: Tensors<Self>) -> Tensors<Self> {
-        match arguments.are_f32() {
-            true => kernel.on_gpu(arguments),
-            false => kernel.composed(arguments),
-        }
-    }
-}
-
-fn run_on_host<B: HostBackend>(kernel: &impl TensorKernel, arguments: Tensors<B>) -> Tensors<B> {
-    match arguments.are_f32() {
-        true => kernel.on_host(arguments),
-        false => kernel.composed(arguments),
+        kernel.on_gpu(arguments)
     }
 }
 

@@ -5,16 +5,14 @@
 //! result go from registers (`tile`) into fresh memory, or are added to a matrix whose memory no other tensor shares.
 
 #[cfg(feature = "gpu")]
-use super::gpu;
-use burn::backend::Backend;
-#[cfg(feature = "gpu")]
 use burn::backend::Cube;
+#[cfg(feature = "gpu")]
+use burn::backend::ops::FloatTensorOps;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
 #[cfg(feature = "gpu")]
-use super::composed::add_optional;
-use super::composed::multiply_add;
+use super::gpu;
 use super::host::HostBackend;
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
 use super::tensors::Tensors;
@@ -40,15 +38,15 @@ pub fn product_add(lhs: Tensor<2>, rhs: Tensor<2>, addend: Tensor<2>) -> Tensor<
 struct MatrixProduct;
 
 impl TensorKernel for MatrixProduct {
-    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let ([lhs, rhs], addend) = arguments.take_optional();
-        [multiply_add::<B>(lhs, rhs, addend)].into()
-    }
-
     #[cfg(feature = "gpu")]
     fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
         let ([lhs, rhs], addend) = arguments.take_optional();
-        [add_optional::<Cube>(gpu::product(lhs, rhs), addend)].into()
+        let product = gpu::product(lhs, rhs);
+        [match addend {
+            Some(addend) => Cube::float_add(product, addend),
+            None => product,
+        }]
+        .into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {

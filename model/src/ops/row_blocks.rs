@@ -3,77 +3,29 @@
 
 use std::ops::Range;
 
-use burn::tensor::{DType, Device, Tensor};
 use rayon::prelude::*;
 
-use super::host::{Chunk, MatrixView};
-use super::tile::RightFactor;
+use super::host::Chunk;
 use crate::packing::Packing;
 
 /// Rows of a block at most. Fewer would read the weights and add to their gradients, which often lie in the third-level cache
 /// only, too often; more would not fit the second level.
 const ROWS_PER_BLOCK: usize = 192;
 /// Blocks have a multiple of so many rows: whole tiles of every instruction set.
-const ROW_STEP: usize = 12;
+const BLOCK_ROW_STEP: usize = 12;
 /// Blocks per part of a sum at least: a part takes as much memory as the sum.
 const BLOCKS_PER_PART: usize = 4;
 /// Parts at most; a power of two, so that as many threads have equal shares.
 const MAX_PARTS: usize = 8;
 
-/// Whether operations of this kind can read a tensor: f32 in host memory.
-pub fn runs_on_host(tensor: &Tensor<2>) -> bool {
-    #[allow(deprecated)]
-    let hosts: &[Device] = &[
-        #[cfg(feature = "flex")]
-        Device::flex(),
-        #[cfg(feature = "ndarray")]
-        Device::ndarray(),
-    ];
-    hosts.contains(&tensor.device().inner()) && tensor.dtype() == DType::F32
-}
-
-/// Why such an operation has no other form.
-pub(super) const HOST_ONLY: &str =
-    "callers ask `runs_on_host`; elsewhere every layer is an operation of its own";
-
 /// Runs of rows of one garment each, of about the same length.
 pub(super) fn row_blocks(packing: &Packing) -> Vec<Chunk> {
     let of_garment = |(garment, rows): (usize, Range<usize>)| {
         let (count, end) = (rows.len().div_ceil(ROWS_PER_BLOCK).max(1), rows.end);
-        let step = rows.len().div_ceil(count).next_multiple_of(ROW_STEP).max(ROW_STEP);
+        let step = rows.len().div_ceil(count).next_multiple_of(BLOCK_ROW_STEP).max(BLOCK_ROW_STEP);
         rows.step_by(step).map(move |start| Chunk { garment, rows: start..(start + step).min(end) })
     };
     packing.ranges().enumerate().flat_map(of_garment).collect()
-}
-
-/// The right factor of a product with `matrix`.
-pub(super) fn factor(matrix: MatrixView<'_>) -> RightFactor {
-    factor_of_rows(matrix, 0..matrix.rows(), false)
-}
-
-/// The right factor of a product with the transpose of `matrix`.
-pub(super) fn transposed_factor(matrix: MatrixView<'_>) -> RightFactor {
-    factor_of_rows(matrix, 0..matrix.rows(), true)
-}
-
-/// The right factors of products with square matrices that lie one below the other.
-pub(super) fn square_factors(matrices: MatrixView<'_>, transposed: bool) -> Vec<RightFactor> {
-    let width = matrices.columns();
-    let starts = (0..matrices.rows()).step_by(width);
-    starts.map(|start| factor_of_rows(matrices, start..start + width, transposed)).collect()
-}
-
-fn factor_of_rows(matrix: MatrixView<'_>, rows: Range<usize>, transposed: bool) -> RightFactor {
-    let (block, columns) = (matrix.strided().from(rows.start, 0), matrix.columns());
-    let mut factor = RightFactor::default();
-    // SAFETY: rows of the matrix.
-    unsafe {
-        match transposed {
-            true => factor.fill(block.transposed(), [columns, rows.len()]),
-            false => factor.fill(block, [rows.len(), columns]),
-        }
-    }
-    factor
 }
 
 /// Sums over blocks, K vectors of the given lengths, to which `add` adds what one block contributes; S is memory that a task
@@ -125,11 +77,11 @@ pub(super) fn map_lanes<const I: usize, const O: usize>(
     mut outputs: [&mut [f32]; O],
     function: impl Fn([f32; I], [f32; O]) -> [f32; O],
 ) {
-    const LANES: usize = 16;
+    const MAP_LANES: usize = 16;
     let count = outputs[0].len();
-    let whole = count / LANES * LANES;
-    for at in (0..whole).step_by(LANES) {
-        map_array::<I, O, LANES>(&inputs, &mut outputs, at, &function);
+    let whole = count / MAP_LANES * MAP_LANES;
+    for at in (0..whole).step_by(MAP_LANES) {
+        map_array::<I, O, MAP_LANES>(&inputs, &mut outputs, at, &function);
     }
     for at in whole..count {
         map_array::<I, O, 1>(&inputs, &mut outputs, at, &function);

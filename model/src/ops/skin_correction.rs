@@ -1,15 +1,14 @@
 //! Skin weights plus a correction restricted to the joints a garment uses.
 
 #[cfg(feature = "gpu")]
-use super::gpu;
-use burn::backend::Backend;
-#[cfg(feature = "gpu")]
 use burn::backend::Cube;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
-use super::composed::{add_optional, broadcast_rows};
-use super::host::{Chunk, HostBackend, MatrixView, OutputMatrix, compute};
+#[cfg(feature = "gpu")]
+use super::gpu;
+use super::host::{Chunk, HostBackend, OutputMatrix, compute};
+use super::matrix_view::MatrixView;
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
 use super::tensors::Tensors;
 use crate::packing::Packing;
@@ -31,10 +30,10 @@ pub fn skin_correction(
 
 /// `base + scale·P(values)`. Arguments: mask, values, and the base unless it is zero.
 #[derive(Clone, Debug)]
-pub(super) struct Projection {
-    pub(super) packing: Packing,
-    pub(super) scale: f64,
-    pub(super) zero_sum: bool,
+struct Projection {
+    packing: Packing,
+    scale: f64,
+    zero_sum: bool,
 }
 
 impl Operation<3> for Projection {
@@ -49,21 +48,6 @@ impl Operation<3> for Projection {
 }
 
 impl TensorKernel for Projection {
-    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let ([mask, values], base) = arguments.take_optional();
-        let masked = B::float_mul(values, broadcast_rows::<B>(mask.clone(), &self.packing));
-        let projected = if self.zero_sum {
-            let count = B::float_clamp_min(B::float_sum_dim(mask.clone(), 1), 1.0.into());
-            let share = broadcast_rows::<B>(B::float_div(mask, count), &self.packing);
-            let sum = B::float_sum_dim(masked.clone(), 1);
-            B::float_sub(masked, B::float_mul(share, sum))
-        } else {
-            masked
-        };
-        let scaled = B::float_mul_scalar(projected, self.scale.into());
-        [add_optional::<B>(scaled, base)].into()
-    }
-
     #[cfg(feature = "gpu")]
     fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
         let (mask_and_values, base) = arguments.take_optional();

@@ -7,11 +7,13 @@
 use std::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 
+#[cfg(feature = "gpu")]
+use burn::backend::Cube;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, TensorMetadata};
-use burn::tensor::{Shape, Tensor};
+use burn::tensor::{Shape, Slice, Tensor};
 
-use super::composed::column_block;
+use super::host::HostBackend;
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, TensorKernel, apply};
 use super::tensors::Tensors;
 
@@ -67,7 +69,12 @@ pub fn split_columns(wide: Tensor<2>, width: usize, count: usize) -> Vec<Tensor<
 struct Collector(ColumnGradients);
 
 impl TensorKernel for Collector {
-    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        arguments
+    }
+
+    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         arguments
     }
 }
@@ -86,11 +93,23 @@ struct Block {
     gradients: ColumnGradients,
 }
 
-impl TensorKernel for Block {
-    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+impl Block {
+    fn cut<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [wide] = arguments.take();
-        let width = self.gradients.width;
-        [column_block::<B>(wide, self.index * width..(self.index + 1) * width)].into()
+        let (rows, width) = (wide.shape()[0], self.gradients.width);
+        let columns = self.index * width..(self.index + 1) * width;
+        [B::float_slice(wide, &[Slice::from(0..rows), Slice::from(columns)])].into()
+    }
+}
+
+impl TensorKernel for Block {
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        self.cut(arguments)
+    }
+
+    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        self.cut(arguments)
     }
 }
 

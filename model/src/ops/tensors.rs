@@ -21,8 +21,10 @@ impl<B: Backend> Tensors<B> {
         self.0.try_into().unwrap_or_else(|_| panic!("{count} tensors, expected {N}"))
     }
 
-    pub(super) fn are_f32(&self) -> bool {
-        self.0.iter().all(|tensor| tensor.dtype() == DType::F32)
+    /// # Panics
+    /// If a tensor has other elements: kernels do not look.
+    pub(super) fn assert_f32(&self) {
+        assert!(self.0.iter().all(|tensor| tensor.dtype() == DType::F32), "networks compute in f32");
     }
 
     /// N tensors, and one more if there is one.

@@ -3,38 +3,25 @@
 //! The same source is compiled for every instruction set, with tiles that fill its registers. An element of the result is
 //! the sum of its terms in their order, whatever tile it lies in: how a matrix is cut into blocks changes no bit.
 
+use std::mem::MaybeUninit;
 use std::ops::Range;
 
-use pulp::{Scalar128b, Simd};
+use pulp::Simd;
 
-use super::host::vectorised;
+use super::instruction_set::{InstructionSet, vectorised};
+use super::matrix_view::MatrixView;
 
-/// First element, row and column step of a matrix in memory.
+/// The left factor of a tile: first element, steps to the next row and term.
 #[derive(Clone, Copy)]
-pub(super) struct StridedMatrix {
-    pub(super) first: *const f32,
-    pub(super) row_stride: isize,
-    pub(super) column_stride: isize,
+struct LeftFactor {
+    first: *const f32,
+    row_stride: usize,
+    term_stride: usize,
 }
 
-// SAFETY: only read, and whoever makes one outlives every use.
-unsafe impl Send for StridedMatrix {}
-unsafe impl Sync for StridedMatrix {}
-
-impl StridedMatrix {
-    /// A matrix whose rows lie one after another.
-    pub(super) fn of_rows(values: &[f32], columns: usize) -> Self {
-        Self { first: values.as_ptr(), row_stride: columns as isize, column_stride: 1 }
-    }
-
-    /// The matrix from row `row` and column `column` on.
-    pub(super) fn from(self, row: usize, column: usize) -> Self {
-        let offset = row as isize * self.row_stride + column as isize * self.column_stride;
-        Self { first: self.first.wrapping_offset(offset), ..self }
-    }
-
-    pub(super) fn transposed(self) -> Self {
-        Self { row_stride: self.column_stride, column_stride: self.row_stride, ..self }
+impl LeftFactor {
+    fn rows_from(self, row: usize) -> Self {
+        Self { first: self.first.wrapping_add(row * self.row_stride), ..self }
     }
 }
 
@@ -50,48 +37,9 @@ unsafe impl Send for OutputBlock {}
 unsafe impl Sync for OutputBlock {}
 
 impl OutputBlock {
-    /// A matrix whose rows lie one after another.
-    pub(super) fn of_rows(values: &mut [f32], columns: usize) -> Self {
-        Self { first: values.as_mut_ptr(), row_stride: columns }
-    }
-
     /// The block from row `row` and column `column` on.
     pub(super) fn from(self, row: usize, column: usize) -> Self {
         Self { first: self.first.wrapping_add(row * self.row_stride + column), ..self }
-    }
-}
-
-/// The instruction sets that blocks are compiled for.
-#[derive(Clone, Copy)]
-enum InstructionSet {
-    #[cfg(target_arch = "x86_64")]
-    Avx512(pulp::x86::V4),
-    #[cfg(target_arch = "x86_64")]
-    Avx2(pulp::x86::V3),
-    Baseline(Scalar128b),
-}
-
-impl InstructionSet {
-    #[inline]
-    fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(simd) = pulp::x86::V4::try_new() {
-            return Self::Avx512(simd);
-        } else if let Some(simd) = pulp::x86::V3::try_new() {
-            return Self::Avx2(simd);
-        }
-        Self::Baseline(Scalar128b)
-    }
-
-    /// Elements of a vector.
-    fn lanes(self) -> usize {
-        match self {
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(_) => 16,
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(_) => 8,
-            Self::Baseline(_) => 4,
-        }
     }
 }
 
@@ -105,12 +53,16 @@ pub(super) struct RightFactor {
 }
 
 impl RightFactor {
-    /// Becomes a matrix of `[inner, columns]` elements, in the memory it has.
-    ///
-    /// # Safety
-    /// `matrix` has that size.
-    pub(super) unsafe fn fill(&mut self, matrix: StridedMatrix, [inner, columns]: [usize; 2]) {
+    pub(super) fn new(matrix: MatrixView<'_>) -> Self {
+        let mut factor = Self::default();
+        factor.fill(matrix);
+        factor
+    }
+
+    /// Becomes another matrix, in the memory it has.
+    pub(super) fn fill(&mut self, matrix: MatrixView<'_>) {
         let lanes = InstructionSet::detect().lanes();
+        let (inner, columns) = (matrix.rows(), matrix.columns());
         (self.inner, self.columns) = (inner, columns);
         self.values.clear();
         self.values.reserve(inner * columns.next_multiple_of(lanes));
@@ -121,11 +73,11 @@ impl RightFactor {
                 while at < columns {
                     let wanted = (columns - at).min(2 * lanes);
                     let width = wanted.next_multiple_of(lanes);
-                    // SAFETY: the panel lies in the matrix; its memory has been reserved and is written.
+                    // SAFETY: the panel's memory has been reserved and is written.
                     unsafe {
                         let start = self.values.len();
                         let panel = self.values.as_mut_ptr().add(start);
-                        write_panel(panel, matrix.from(0, at), inner, wanted, width);
+                        write_panel(panel, matrix.block(0..inner, at..at + wanted), width);
                         self.values.set_len(start + inner * width);
                     }
                     at += wanted;
@@ -134,21 +86,71 @@ impl RightFactor {
         );
     }
 
+    /// Writes `lhs·self` row after row, and returns it.
+    ///
+    /// # Panics
+    /// If sizes disagree.
+    pub(super) fn product<'o>(
+        &self,
+        lhs: MatrixView<'_>,
+        output: &'o mut [MaybeUninit<f32>],
+    ) -> &'o mut [f32] {
+        assert_eq!(output.len(), lhs.rows() * self.columns, "the output of a product has another size");
+        let block = OutputBlock { first: output.as_mut_ptr().cast(), row_stride: self.columns };
+        // SAFETY: the output has the size of the product, and all of it is written.
+        unsafe {
+            self.multiply(lhs, 0..self.inner, block, false);
+            output.assume_init_mut()
+        }
+    }
+
+    /// Writes `lhs·self` row after row over what `output` holds.
+    ///
+    /// # Panics
+    /// If sizes disagree.
+    pub(super) fn overwrite(&self, lhs: MatrixView<'_>, output: &mut [f32]) {
+        self.write(lhs, output, false);
+    }
+
+    /// Adds `lhs·self`.
+    ///
+    /// # Panics
+    /// If sizes disagree.
+    pub(super) fn add_product(&self, lhs: MatrixView<'_>, sum: &mut [f32]) {
+        self.write(lhs, sum, true);
+    }
+
+    fn write(&self, lhs: MatrixView<'_>, output: &mut [f32], add: bool) {
+        assert_eq!(output.len(), lhs.rows() * self.columns, "the output of a product has another size");
+        let block = OutputBlock { first: output.as_mut_ptr(), row_stride: self.columns };
+        // SAFETY: the output has the size of the product.
+        unsafe { self.multiply(lhs, 0..self.inner, block, add) };
+    }
+
     /// `output = lhs·(rows `terms` of the right factor)`, plus what `output` holds if `add`.
     ///
+    /// # Panics
+    /// If the inner sizes differ, or neither rows nor columns of `lhs` are contiguous.
+    ///
     /// # Safety
-    /// `lhs` has `[rows, terms.len()]` elements; `output` `[rows, columns]`, initialised if `add`, that nobody else uses.
+    /// `output` has as many rows as `lhs` and the columns of the right factor, is initialised if `add`, and nobody else uses it.
     pub(super) unsafe fn multiply(
         &self,
-        lhs: StridedMatrix,
-        rows: usize,
+        lhs: MatrixView<'_>,
         terms: Range<usize>,
         output: OutputBlock,
         add: bool,
     ) {
         assert!(terms.end <= self.inner, "terms of a product beyond its right factor");
-        let turned = lhs.column_stride != 1;
-        assert!(!turned || lhs.row_stride == 1, "neither rows nor columns of a left factor are contiguous");
+        let rows = lhs.rows();
+        assert_eq!(lhs.columns(), terms.len(), "the inner sizes of a product differ");
+        let [row_stride, term_stride] = lhs.strides();
+        let lhs = LeftFactor { first: lhs.as_ptr(), row_stride, term_stride };
+        let turned = term_stride != 1;
+        assert!(
+            !turned || row_stride == 1 || rows == 1,
+            "neither rows nor columns of a left factor are contiguous"
+        );
         macro_rules! block {
             ($simd:expr, $rows:literal) => {
                 match turned {
@@ -179,7 +181,7 @@ impl RightFactor {
     unsafe fn block<S: Simd, const R: usize, const TURNED: bool>(
         &self,
         simd: S,
-        lhs: StridedMatrix,
+        lhs: LeftFactor,
         rows: usize,
         terms: Range<usize>,
         output: OutputBlock,
@@ -204,19 +206,21 @@ impl RightFactor {
     }
 }
 
-/// Writes `[inner, columns]` elements, every row filled up with zeros to `width`.
+/// Writes a matrix row after row, every one filled up with zeros to `width`.
 ///
 /// # Safety
-/// `matrix` has that size, `panel` is memory for `[inner, width]`.
+/// `panel` is memory for as many rows of `width` elements.
 #[inline(always)]
-unsafe fn write_panel(panel: *mut f32, matrix: StridedMatrix, inner: usize, columns: usize, width: usize) {
+unsafe fn write_panel(panel: *mut f32, matrix: MatrixView<'_>, width: usize) {
+    let (inner, columns, [row_stride, column_stride]) = (matrix.rows(), matrix.columns(), matrix.strides());
+    let first = matrix.as_ptr();
     // SAFETY (all): elements of matrix and panel.
     unsafe {
-        if matrix.column_stride == 1 {
+        if column_stride == 1 {
             match (columns == width, width) {
-                (true, 32) => return copy_rows::<32>(panel, matrix, inner),
-                (true, 16) => return copy_rows::<16>(panel, matrix, inner),
-                (true, 8) => return copy_rows::<8>(panel, matrix, inner),
+                (true, 32) => return copy_rows::<32>(panel, first, row_stride, inner),
+                (true, 16) => return copy_rows::<16>(panel, first, row_stride, inner),
+                (true, 8) => return copy_rows::<8>(panel, first, row_stride, inner),
                 _ => {}
             }
         }
@@ -226,10 +230,10 @@ unsafe fn write_panel(panel: *mut f32, matrix: StridedMatrix, inner: usize, colu
         // So many terms that what is written stays in the first cache.
         for start in (0..inner).step_by(64) {
             for column in 0..columns {
-                let from = matrix.from(start, column).first;
+                let from = first.add(start * row_stride + column * column_stride);
                 let panel = panel.add(start * width + column);
                 for row in 0..64.min(inner - start) {
-                    panel.add(row * width).write(*from.offset(row as isize * matrix.row_stride));
+                    panel.add(row * width).write(*from.add(row * row_stride));
                 }
             }
         }
@@ -238,11 +242,11 @@ unsafe fn write_panel(panel: *mut f32, matrix: StridedMatrix, inner: usize, colu
 
 /// Rows of a known length, which are moved without a call.
 #[inline(always)]
-unsafe fn copy_rows<const C: usize>(panel: *mut f32, matrix: StridedMatrix, rows: usize) {
+unsafe fn copy_rows<const C: usize>(panel: *mut f32, first: *const f32, row_stride: usize, rows: usize) {
     for row in 0..rows {
         // SAFETY: rows of matrix and panel.
         unsafe {
-            let values = matrix.from(row, 0).first.cast::<[f32; C]>().read_unaligned();
+            let values = first.add(row * row_stride).cast::<[f32; C]>().read_unaligned();
             panel.add(row * C).cast::<[f32; C]>().write_unaligned(values);
         }
     }
@@ -253,7 +257,7 @@ unsafe fn copy_rows<const C: usize>(panel: *mut f32, matrix: StridedMatrix, rows
 #[allow(clippy::too_many_arguments)]
 unsafe fn strip<S: Simd, const R: usize, const V: usize, const TURNED: bool>(
     simd: S,
-    lhs: StridedMatrix,
+    lhs: LeftFactor,
     rows: usize,
     rhs: *const f32,
     inner: usize,
@@ -265,17 +269,17 @@ unsafe fn strip<S: Simd, const R: usize, const V: usize, const TURNED: bool>(
     // SAFETY: rows below `rows`.
     unsafe {
         while row + R <= rows {
-            let (lhs, output) = (lhs.from(row, 0), output.from(row, 0));
+            let (lhs, output) = (lhs.rows_from(row), output.from(row, 0));
             tile::<S, R, V, TURNED>(simd, lhs, rhs, inner, output, columns, add);
             row += R;
         }
         while row + 4 <= rows {
-            let (lhs, output) = (lhs.from(row, 0), output.from(row, 0));
+            let (lhs, output) = (lhs.rows_from(row), output.from(row, 0));
             tile::<S, 4, V, TURNED>(simd, lhs, rhs, inner, output, columns, add);
             row += 4;
         }
         while row < rows {
-            let (lhs, output) = (lhs.from(row, 0), output.from(row, 0));
+            let (lhs, output) = (lhs.rows_from(row), output.from(row, 0));
             tile::<S, 1, V, TURNED>(simd, lhs, rhs, inner, output, columns, add);
             row += 1;
         }
@@ -286,7 +290,7 @@ unsafe fn strip<S: Simd, const R: usize, const V: usize, const TURNED: bool>(
 #[inline(always)]
 unsafe fn tile<S: Simd, const R: usize, const V: usize, const TURNED: bool>(
     simd: S,
-    lhs: StridedMatrix,
+    lhs: LeftFactor,
     rhs: *const f32,
     inner: usize,
     output: OutputBlock,
@@ -305,8 +309,8 @@ unsafe fn tile<S: Simd, const R: usize, const V: usize, const TURNED: bool>(
             // SAFETY: an element of the left factor.
             let left = simd.splat_f32s(unsafe {
                 match TURNED {
-                    true => *lhs.first.offset(term as isize * lhs.column_stride).add(row),
-                    false => *lhs.first.offset(row as isize * lhs.row_stride).add(term),
+                    true => *lhs.first.add(term * lhs.term_stride + row),
+                    false => *lhs.first.add(row * lhs.row_stride + term),
                 }
             });
             for vector in 0..V {

@@ -117,11 +117,6 @@ impl OutfitTensors {
         &self.packing
     }
 
-    /// Whether any two garments can touch.
-    pub fn has_contacts(&self) -> bool {
-        self.edges.is_some()
-    }
-
     /// Edges between all garments, whatever the contacts; `None` for a single one.
     pub(crate) fn complete_edges(&self) -> Option<ForceEdges> {
         ForceEdges::new(&Self::all_pairs(self.packing.count()), &self.packing, &self.rest.device())

@@ -68,17 +68,16 @@ def transforms(x):
 
 
 def garment(x, number):
-    """Name, mesh or None, and hints as JSON of a file, a name, a pair of arrays, or a `Garment` of these."""
+    """Name, mesh, and hints as JSON of a file, a name, a pair of arrays, or a `Garment` of these."""
     from . import Garment
 
     given = x if isinstance(x, Garment) else Garment(x)
     name = given.name or f"garment_{number}"
     if is_path(given.source):
-        name, arrays = os.fspath(given.source), None
-    else:
-        arrays = mesh(given.source, name)
+        name = os.fspath(given.source)
+    source = mesh(given.source, name)
     hints = {key: plain(value) for key, value in given.hints.items() if value is not None}
-    return name, arrays, json.dumps({"file": name, **hints})
+    return name, source, json.dumps({"file": name, **hints})
 
 
 def plain(x):

@@ -2,32 +2,35 @@
 
 use burn::backend::tensor::FloatTensor;
 
-use super::{ActivatedSum, Activation};
-use crate::ops::host::{
-    Chunk, HostBackend, MatrixView, OutputMatrix, chunks, compute, for_each, split_mut, vectorised,
-};
+use super::function::Activation;
+use crate::ops::host::{Chunk, HostBackend, OutputMatrix, chunks, compute, for_each, split_mut};
+use crate::ops::instruction_set::vectorised;
 use crate::ops::math;
+use crate::ops::matrix_view::MatrixView;
 use crate::ops::tensors::Tensors;
+use crate::packing::Packing;
 
 pub(super) fn forward<B: HostBackend>(
-    operation: &ActivatedSum,
+    activation: Activation,
+    packing: &Packing,
     mut matrices: Vec<FloatTensor<B>>,
     rows: FloatTensor<B>,
     residual: Option<FloatTensor<B>>,
 ) -> Tensors<B> {
     let mut first = matrices.remove(0);
-    let others: Vec<B::Held> = matrices.into_iter().map(B::hold).collect();
+    let others: Vec<FloatTensor<B>> = matrices.into_iter().map(B::hold).collect();
     let (rows, residual) = (B::hold(rows), residual.map(B::hold));
     let others: Vec<MatrixView<'_>> = others.iter().map(B::view).collect();
     let (rows, residual) = (B::view(&rows), residual.as_ref().map(B::view));
     let columns = rows.columns();
     if let Some(values) = B::own_values_mut(&mut first) {
-        let chunks = chunks(&operation.packing, columns);
-        let tasks = chunks.iter().zip(split_mut(values, &chunks, columns)).collect();
+        let chunks = chunks(packing, columns);
+        let lengths = chunks.iter().map(|chunk| chunk.rows.len() * columns);
+        let tasks = chunks.iter().zip(split_mut(values, lengths)).collect();
         for_each(tasks, |(chunk, values): (&Chunk, &mut [f32])| {
             vectorised(
                 #[inline(always)]
-                || forward_chunk(&others, rows, residual, chunk, values, operation.activation),
+                || forward_chunk(&others, rows, residual, chunk, values, activation),
             );
         });
         return [first].into();
@@ -35,7 +38,7 @@ pub(super) fn forward<B: HostBackend>(
     let first = B::hold(first);
     let first = B::view(&first);
     compute(
-        &operation.packing,
+        packing,
         columns,
         [OutputMatrix::Rows(columns)],
         #[inline(always)]
@@ -43,7 +46,7 @@ pub(super) fn forward<B: HostBackend>(
             for (row, output) in chunk.rows.clone().zip(output.chunks_exact_mut(columns)) {
                 output.copy_from_slice(first.row(row));
             }
-            forward_chunk(&others, rows, residual, chunk, output, operation.activation);
+            forward_chunk(&others, rows, residual, chunk, output, activation);
         },
     )
 }
@@ -97,21 +100,22 @@ fn map(output: &mut [f32], function: impl Fn(f32) -> f32) {
     }
 }
 
-/// Gradients of a matrix and of the rows; `activated` as in [`ActivatedSumGradients`](super::ActivatedSumGradients).
+/// Gradients of a matrix and of the rows, from what the activation was applied to.
 pub(super) fn backward<B: HostBackend>(
-    operation: &ActivatedSum,
+    activation: Activation,
+    packing: &Packing,
     activated: Vec<FloatTensor<B>>,
     gradient: FloatTensor<B>,
 ) -> Tensors<B> {
     let identity = activated.is_empty().then(|| gradient.clone());
-    let activated: Vec<B::Held> = activated.into_iter().map(B::hold).collect();
+    let activated: Vec<FloatTensor<B>> = activated.into_iter().map(B::hold).collect();
     let activated: Vec<MatrixView<'_>> = activated.iter().map(B::view).collect();
     let gradient = B::hold(gradient);
     let gradient = B::view(&gradient);
     let columns = gradient.columns();
     if let Some(identity) = identity {
         let [sums] = compute::<B, 1>(
-            &operation.packing,
+            packing,
             columns,
             [OutputMatrix::Sums(columns)],
             #[inline(always)]
@@ -125,12 +129,12 @@ pub(super) fn backward<B: HostBackend>(
         return [identity, sums].into();
     }
     compute(
-        &operation.packing,
+        packing,
         columns,
         [OutputMatrix::Rows(columns), OutputMatrix::Sums(columns)],
         #[inline(always)]
         |chunk, [output, sums]| {
-            backward_chunk(&activated, gradient, chunk, output, sums, operation.activation);
+            backward_chunk(&activated, gradient, chunk, output, sums, activation);
         },
     )
 }

@@ -1,142 +1,101 @@
 //! From features and coefficients to features.
 
 use std::mem::MaybeUninit;
+use std::ops::Range;
 
 use burn::backend::tensor::FloatTensor;
 
-use super::{DiffusionMlp, STATES, axes};
-use crate::ops::host::{Chunk, HostBackend, MatrixView, NewValues, for_each, vectorised};
+use crate::ops::host::{Chunk, HostBackend, NewValues, for_each, zeroed};
+use crate::ops::instruction_set::vectorised;
 use crate::ops::math::tanh;
-use crate::ops::row_blocks::{factor, map_lanes, row_blocks};
+use crate::ops::matrix_view::MatrixView;
+use crate::ops::row_blocks::{map_lanes, row_blocks};
 use crate::ops::tensors::Tensors;
-use crate::ops::tile::{OutputBlock, RightFactor, StridedMatrix};
+use crate::ops::tile::RightFactor;
 use crate::packing::Packing;
 
+/// Matrices `[V,C]` that the backward pass reads: x0, y0, x1 − y2, y1 + x2, gradient features, both hidden layers.
+pub(super) const STATES: usize = 7;
+
+/// The gradients of the eigenvectors along both axes, at some vertices.
+pub(super) fn axes<'a>(gradient_basis: MatrixView<'a>, vertices: &Range<usize>) -> [MatrixView<'a>; 2] {
+    let offset = gradient_basis.rows() / 2;
+    [0, offset].map(|first| gradient_basis.some_rows(first + vertices.start..first + vertices.end))
+}
+
 /// The result; then, if it is `recorded`, the states of every block of rows one after the other.
-pub(super) fn run<B: HostBackend>(operation: &DiffusionMlp, arguments: [FloatTensor<B>; 14]) -> Tensors<B> {
-    let DiffusionMlp { recorded } = *operation;
+pub(super) fn run<B: HostBackend>(recorded: bool, arguments: [FloatTensor<B>; 14]) -> Tensors<B> {
     let held = arguments.map(B::hold);
     let views = held.each_ref().map(B::view);
     let [features, gradient_basis, basis, c, real, imaginary, diffused, gradient, input, bias, ..] = views;
     let [.., hidden, hidden_bias, output, output_bias] = views;
     let width = features.columns();
     let negative: Vec<f32> = (0..imaginary.rows()).flat_map(|row| imaginary.row(row)).map(|c| -c).collect();
-    let mut negative_imaginary = RightFactor::default();
-    // SAFETY: the copy has the same size.
-    unsafe {
-        let matrix = StridedMatrix::of_rows(&negative, width);
-        negative_imaginary.fill(matrix, [imaginary.rows(), width]);
-    }
-    let pass = Pass {
-        features,
-        gradient_basis,
-        basis,
-        coefficients: [c, real, imaginary].map(factor),
-        negative_imaginary,
-        diffused: factor(diffused),
-        weights: [gradient, input, hidden, output].map(factor),
-        biases: [bias, hidden_bias, output_bias].map(|bias| bias.row(0)),
+    let negative_imaginary = RightFactor::new(MatrixView::of_rows(&negative, width));
+    let [c, real, imaginary, diffused] = [c, real, imaginary, diffused].map(RightFactor::new);
+    let [gradient, input, hidden, output] = [gradient, input, hidden, output].map(RightFactor::new);
+    let [bias, hidden_bias, output_bias] = [bias, hidden_bias, output_bias].map(|bias| bias.row(0));
+
+    // Writes all of the result and of the states.
+    let pass = |block: &Chunk, result: &mut [MaybeUninit<f32>], states: &mut [MaybeUninit<f32>]| {
+        let mut states = states.chunks_exact_mut(result.len());
+        let mut state = || states.next().expect("memory for every state");
+        let [along_x, along_y] = axes(gradient_basis, &block.rows);
+        let x = c.product(along_x, state());
+        let y = c.product(along_y, state());
+        let x1 = real.product(along_x, state());
+        negative_imaginary.add_product(along_y, x1);
+        let y1 = real.product(along_y, state());
+        imaginary.add_product(along_x, y1);
+        let mixed = zeroed(state());
+        vectorised(
+            #[inline(always)]
+            || gradient_features([x, y, x1, y1], mixed),
+        );
+        let first = gradient.product(MatrixView::of_rows(mixed, width), state());
+        diffused.add_product(basis.some_rows(block.rows.clone()), first);
+        input.add_product(features.some_rows(block.rows.clone()), first);
+        vectorised(
+            #[inline(always)]
+            || relu(first, bias),
+        );
+        let second = hidden.product(MatrixView::of_rows(first, width), state());
+        vectorised(
+            #[inline(always)]
+            || relu(second, hidden_bias),
+        );
+        let result = output.product(MatrixView::of_rows(second, width), result);
+        vectorised(
+            #[inline(always)]
+            || {
+                for (row, result) in block.rows.clone().zip(result.chunks_exact_mut(width)) {
+                    let (bias, features) = (&output_bias[..width], &features.row(row)[..width]);
+                    for channel in 0..width {
+                        result[channel] += bias[channel] + features[channel];
+                    }
+                }
+            },
+        );
     };
     let blocks = row_blocks(&Packing::new([features.rows()]));
-    let lengths = |columns: usize| blocks.iter().map(|block| block.rows.len() * columns).collect();
-    let of_states = if recorded { STATES * width } else { 0 };
-    let mut result = NewValues::new(lengths(width));
-    let mut states = NewValues::new(lengths(of_states));
+    let mut result = NewValues::of_rows(&blocks, width);
+    let mut states = NewValues::of_rows(&blocks, if recorded { STATES * width } else { 0 });
     let parts = result.parts().into_iter().zip(states.parts());
     for_each(blocks.iter().zip(parts).collect(), |(block, (result, states))| {
-        // SAFETY: a pass writes all of the result and, if it gets memory for them, of the states.
-        unsafe {
-            let (result, states) = (result.unwritten(), states.unwritten());
-            match recorded {
-                true => pass.block(block, result, states),
-                false => {
-                    let mut scratch = Vec::with_capacity(STATES * result.len());
-                    pass.block(block, result, scratch.spare_capacity_mut());
-                }
+        let mut scratch: Vec<f32> = Vec::new();
+        let states = match recorded {
+            true => states,
+            false => {
+                scratch.reserve(STATES * result.len());
+                scratch.spare_capacity_mut()
             }
-        }
+        };
+        pass(block, result, states);
     });
-    let mut results = vec![B::matrix(result.finish(), width)];
-    if recorded {
-        results.push(B::matrix(states.finish(), STATES * width));
-    }
-    Tensors(results)
-}
-
-struct Pass<'a> {
-    features: MatrixView<'a>,
-    gradient_basis: MatrixView<'a>,
-    basis: MatrixView<'a>,
-    coefficients: [RightFactor; 3],
-    negative_imaginary: RightFactor,
-    diffused: RightFactor,
-    /// Of the gradient features, of the features, of the second layer, of the output.
-    weights: [RightFactor; 4],
-    /// Of the first layer, of the second, of the output.
-    biases: [&'a [f32]; 3],
-}
-
-impl Pass<'_> {
-    /// # Safety
-    /// `states` has room for the states of the block.
-    unsafe fn block(&self, block: &Chunk, result: &mut [MaybeUninit<f32>], states: &mut [MaybeUninit<f32>]) {
-        let (count, width, eigen) = (block.rows.len(), self.features.columns(), self.basis.columns());
-        let size = count * width;
-        assert!(result.len() == size && states.len() >= STATES * size);
-        let first = states.as_mut_ptr().cast::<f32>();
-        let place = |state: usize| OutputBlock { first: first.wrapping_add(state * size), row_stride: width };
-        let result = OutputBlock { first: result.as_mut_ptr().cast(), row_stride: width };
-        let [gradient, input, hidden, output] = &self.weights;
-        let [c, real, imaginary] = &self.coefficients;
-        let [x, y] = axes(&self.gradient_basis, block.rows.start);
-        let features = self.features.strided().from(block.rows.start, 0);
-        let basis = self.basis.strided().from(block.rows.start, 0);
-        // SAFETY: every matrix has `count` rows of its columns, and is written before it is read.
-        unsafe {
-            let written = |state: usize| std::slice::from_raw_parts_mut(place(state).first, size);
-            let product =
-                |lhs: StridedMatrix, rhs: &RightFactor, terms: usize, to: OutputBlock, add: bool| {
-                    rhs.multiply(lhs, count, 0..terms, to, add);
-                };
-            product(x, c, eigen, place(0), false);
-            product(y, c, eigen, place(1), false);
-            product(x, real, eigen, place(2), false);
-            product(y, &self.negative_imaginary, eigen, place(2), true);
-            product(y, real, eigen, place(3), false);
-            product(x, imaginary, eigen, place(3), true);
-            std::ptr::write_bytes(place(4).first, 0, size);
-            let mixed = [0, 1, 2, 3].map(|state| &*written(state));
-            vectorised(
-                #[inline(always)]
-                || gradient_features(mixed, written(4)),
-            );
-            product(StridedMatrix::of_rows(written(4), width), gradient, width, place(5), false);
-            product(basis, &self.diffused, eigen, place(5), true);
-            product(features, input, width, place(5), true);
-            vectorised(
-                #[inline(always)]
-                || relu(written(5), self.biases[0]),
-            );
-            product(StridedMatrix::of_rows(written(5), width), hidden, width, place(6), false);
-            vectorised(
-                #[inline(always)]
-                || relu(written(6), self.biases[1]),
-            );
-            product(StridedMatrix::of_rows(written(6), width), output, width, result, false);
-            let result = std::slice::from_raw_parts_mut(result.first, size);
-            vectorised(
-                #[inline(always)]
-                || {
-                    for (row, result) in block.rows.clone().zip(result.chunks_exact_mut(width)) {
-                        let (bias, features) = (&self.biases[2][..width], &self.features.row(row)[..width]);
-                        for channel in 0..width {
-                            result[channel] += bias[channel] + features[channel];
-                        }
-                    }
-                },
-            );
-        }
-    }
+    // SAFETY: a pass has written every part.
+    let (result, states) = unsafe { (result.finish(), states.finish()) };
+    let states = recorded.then(|| B::matrix(states, STATES * width));
+    Tensors(std::iter::once(B::matrix(result, width)).chain(states).collect())
 }
 
 #[inline(always)]

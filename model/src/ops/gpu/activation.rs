@@ -1,17 +1,21 @@
 //! `activation(sum of matrices + one row per garment) + residual`.
 
+use burn::backend::Cube;
+use burn::backend::ops::FloatTensorOps;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::column_sums::{BLOCK, ROW_STEP, blocks, column, end_row, first_row, total, total_of, write_block};
+use super::column_sums::{
+    ROWS_PER_SUM, UNIT_ROW_STEP, blocks, column, end_row, first_row, total, total_of, write_block,
+};
 use super::math::{gelu_derivative, normal_distribution};
-use super::{GpuTensor, Matrix, groups};
+use super::matrix::{GpuTensor, Matrix, groups};
 use crate::ops::activation::Activation;
 use crate::packing::Packing;
 
 /// What a kernel adds up, and what it does with the sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-struct Form {
+struct ActivationForm {
     activation: Activation,
     /// Whether there is a second matrix.
     second: bool,
@@ -65,7 +69,7 @@ fn forward<N: Size>(
     end: usize,
     garment: usize,
     vectors: usize,
-    #[comptime] form: Form,
+    #[comptime] form: ActivationForm,
 ) {
     let i = start + ABSOLUTE_POS;
     if i < end {
@@ -81,7 +85,7 @@ fn forward<N: Size>(
     }
 }
 
-/// See [`activate_residual`](super::super::activate_residual) and its siblings; one or two matrices.
+/// See [`activate_residual`](crate::ops::activate_residual) and its siblings; one or two matrices.
 pub(in crate::ops) fn activated_sum(
     activation: Activation,
     packing: &Packing,
@@ -98,7 +102,8 @@ pub(in crate::ops) fn activated_sum(
     let output = first.empty(first.rows, first.columns);
     let width = first.width();
     let vectors = first.columns / width;
-    let form = Form { activation, second: second.is_some(), residual: residual.is_some(), rows: true };
+    let form =
+        ActivationForm { activation, second: second.is_some(), residual: residual.is_some(), rows: true };
     for (garment, range) in packing.ranges().enumerate() {
         let (count, dim) = groups(first.client(), range.len() * vectors);
         // SAFETY: units beyond the last row of the garment do nothing.
@@ -136,7 +141,7 @@ fn backward<N: Size>(
     end: usize,
     garment: usize,
     vectors: usize,
-    #[comptime] form: Form,
+    #[comptime] form: ActivationForm,
 ) {
     let mut total = Vector::<f32, N>::new(0.0);
     if column() < vectors {
@@ -154,27 +159,27 @@ fn backward<N: Size>(
             let value = gradient[i] * slope::<N>(sum, form.activation);
             output[i] = value;
             total += value;
-            row += ROW_STEP;
+            row += UNIT_ROW_STEP;
         }
     }
     write_block::<N>(total, partial, vectors);
 }
 
-/// Gradients of every matrix, and of the row of every garment. `sum` is what the activation was applied to: nothing (identity),
+/// Gradients of every matrix (they are equal), and of the rows of the garments. `sum` is what the activation was applied to: nothing (identity),
 /// one matrix of the same sign (the result of ReLU), or one or two matrices and the rows.
 pub(in crate::ops) fn activated_sum_gradients(
     activation: Activation,
     packing: &Packing,
     mut sum: Vec<GpuTensor>,
     gradient: GpuTensor,
-) -> (GpuTensor, Vec<GpuTensor>) {
+) -> [GpuTensor; 2] {
     let gradient = Matrix::new(gradient);
     let rows = if sum.len() > 1 { sum.pop() } else { None }.map(Matrix::new);
     let matrices: Vec<Matrix> = sum.into_iter().map(Matrix::new).collect();
     // The slope of identity is one wherever it is taken.
     let Some(first) = matrices.first().filter(|_| activation != Activation::Identity) else {
         let of_rows = packing.ranges().map(|rows| total_of(&gradient, rows).tensor).collect();
-        return (gradient.tensor, of_rows);
+        return [gradient.tensor, joined(of_rows)];
     };
     gradient.assert_like(&matrices);
     rows.iter().for_each(|rows| rows.assert_size(packing.count(), gradient.columns));
@@ -182,10 +187,11 @@ pub(in crate::ops) fn activated_sum_gradients(
     let output = gradient.empty(gradient.rows, gradient.columns);
     let width = gradient.width();
     let vectors = gradient.columns / width;
-    let form = Form { activation, second: matrices.len() > 1, residual: false, rows: rows.is_some() };
+    let form =
+        ActivationForm { activation, second: matrices.len() > 1, residual: false, rows: rows.is_some() };
     let mut of_rows = Vec::with_capacity(packing.count());
     for (garment, range) in packing.ranges().enumerate() {
-        let partial = gradient.empty(range.len().div_ceil(BLOCK), gradient.columns);
+        let partial = gradient.empty(range.len().div_ceil(ROWS_PER_SUM), gradient.columns);
         let (count, dim) = blocks(range.len(), vectors);
         // SAFETY: units beyond the last column or row of the garment do nothing.
         unsafe {
@@ -209,5 +215,13 @@ pub(in crate::ops) fn activated_sum_gradients(
         }
         of_rows.push(total(partial).tensor);
     }
-    (output.tensor, of_rows)
+    [output.tensor, joined(of_rows)]
+}
+
+/// Rows one below the other; a lone one is returned as it is.
+fn joined(mut rows: Vec<GpuTensor>) -> GpuTensor {
+    match rows.len() {
+        1 => rows.remove(0),
+        _ => Cube::float_cat(rows, 0),
+    }
 }

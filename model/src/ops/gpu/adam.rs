@@ -3,9 +3,7 @@
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::super::adam::AdamFactors;
-use super::{GpuTensor, Matrix, empty, groups};
-use burn::backend::TensorMetadata;
+use super::matrix::{GpuTensor, Matrix, groups};
 
 #[cube(launch_unchecked)]
 fn update(
@@ -33,16 +31,17 @@ fn update(
     }
 }
 
-/// Parameter and both moments after an update; see [`adam_step`](super::super::adam_step).
-pub(in crate::ops) fn adam(arguments: [GpuTensor; 4], factors: AdamFactors) -> [GpuTensor; 3] {
-    let shape = arguments[0].shape();
+/// Parameter and both moments after an update; see [`adam_step`](crate::ops::adam_step).
+pub(in crate::ops) fn adam(
+    arguments: [GpuTensor; 4],
+    [beta_1, beta_2]: [f32; 2],
+    step_size: f32,
+    epsilon: f32,
+) -> [GpuTensor; 3] {
     let [parameter, gradient, first, second] = arguments.map(Matrix::new);
     parameter.assert_like([&gradient, &first, &second]);
-    let count = shape.num_elements();
-    let results = [(); 3].map(|()| empty(&parameter.tensor, shape.clone()));
-    let outputs = results.clone().map(Matrix::new);
-    let (groups, dim) = groups(parameter.client(), count);
-    let AdamFactors { beta_1, beta_2, step_size, epsilon } = factors;
+    let outputs = [(); 3].map(|()| parameter.like());
+    let (groups, dim) = groups(parameter.client(), parameter.count());
     // SAFETY: units beyond the last entry do nothing.
     unsafe {
         update::launch_unchecked(
@@ -56,12 +55,12 @@ pub(in crate::ops) fn adam(arguments: [GpuTensor; 4], factors: AdamFactors) -> [
             outputs[0].argument(1),
             outputs[1].argument(1),
             outputs[2].argument(1),
-            count,
+            parameter.count(),
             beta_1,
             beta_2,
             step_size,
             epsilon,
         );
     }
-    results
+    outputs.map(|output| output.tensor)
 }

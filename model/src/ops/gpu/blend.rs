@@ -1,11 +1,13 @@
 //! Weighted mean of a parameter and its running average.
 
-use burn::backend::TensorMetadata;
+use burn::backend::Cube;
+use burn::tensor::Tensor;
 use burn_cubecl::cubecl;
-use burn_cubecl::kernel::into_contiguous;
 use cubecl::prelude::*;
 
-use super::{GpuTensor, empty, groups};
+use super::matrix::{Matrix, groups};
+use crate::ops::operation::{TensorKernel, run};
+use crate::ops::tensors::Tensors;
 
 #[cube(launch_unchecked)]
 fn weighted_mean(old: &[f32], new: &[f32], output: &mut [f32], count: usize, decay: f32, rest: f32) {
@@ -15,26 +17,37 @@ fn weighted_mean(old: &[f32], new: &[f32], output: &mut [f32], count: usize, dec
     }
 }
 
-/// See [`blend`](super::super::blend()).
-pub(in crate::ops) fn blend(arguments: [GpuTensor; 2], decay: f64) -> GpuTensor {
-    let shape = arguments[0].shape();
-    let [old, new] = arguments.map(into_contiguous);
-    let output = empty(&old, shape.clone());
-    let count = shape.num_elements();
-    let (groups, dim) = groups(&old.client, count);
-    // SAFETY: units beyond the last entry do nothing.
-    unsafe {
-        weighted_mean::launch_unchecked(
-            &old.client,
-            groups,
-            dim,
-            super::buffer(&old, count, 1),
-            super::buffer(&new, count, 1),
-            super::buffer(&output, count, 1),
-            count,
-            decay as f32,
-            (1.0 - decay) as f32,
-        );
+/// See [`blend`](crate::ops::blend()).
+pub(in crate::ops) fn blend<const D: usize>(old: Tensor<D>, new: Tensor<D>, decay: f64) -> Tensor<D> {
+    let [mean] = run(&WeightedMean { decay }, [old.into_dispatch(), new.into_dispatch()].into()).take();
+    Tensor::from_dispatch(mean)
+}
+
+/// Arguments: old, new.
+struct WeightedMean {
+    decay: f64,
+}
+
+impl TensorKernel for WeightedMean {
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        let [old, new] = arguments.take().map(Matrix::new);
+        old.assert_like([&new]);
+        let output = old.like();
+        let (groups, dim) = groups(old.client(), old.count());
+        // SAFETY: units beyond the last entry do nothing.
+        unsafe {
+            weighted_mean::launch_unchecked(
+                old.client(),
+                groups,
+                dim,
+                old.argument(1),
+                new.argument(1),
+                output.argument(1),
+                old.count(),
+                self.decay as f32,
+                (1.0 - self.decay) as f32,
+            );
+        }
+        [output.tensor].into()
     }
-    output
 }

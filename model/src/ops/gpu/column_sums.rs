@@ -5,38 +5,39 @@ use std::ops::Range;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::{Matrix, UNITS};
+use super::matrix::{Matrix, UNITS};
 
 /// Columns (of whole vectors) that one group works on at a time.
-const LANES: usize = 32;
+const GROUP_COLUMNS: usize = 32;
 /// Rows that one group works on at a time: how far those of a unit are apart.
-pub(super) const ROW_STEP: usize = UNITS as usize / LANES;
+pub(super) const UNIT_ROW_STEP: usize = UNITS as usize / GROUP_COLUMNS;
 
 /// Rows whose sum one group makes.
-pub(super) const BLOCK: usize = 256;
+pub(super) const ROWS_PER_SUM: usize = 256;
 
 /// Groups for the blocks of `rows` rows of `vectors` vectors each.
 pub(super) fn blocks(rows: usize, vectors: usize) -> (CubeCount, CubeDim) {
-    let count = CubeCount::Static(vectors.div_ceil(LANES) as u32, rows.div_ceil(BLOCK) as u32, 1);
+    let count =
+        CubeCount::Static(vectors.div_ceil(GROUP_COLUMNS) as u32, rows.div_ceil(ROWS_PER_SUM) as u32, 1);
     (count, CubeDim::new_1d(UNITS))
 }
 
 /// Which column of vectors this unit works on.
 #[cube]
 pub(super) fn column() -> usize {
-    CUBE_POS_X as usize * LANES + UNIT_POS as usize % LANES
+    CUBE_POS_X as usize * GROUP_COLUMNS + UNIT_POS as usize % GROUP_COLUMNS
 }
 
-/// The first row of this unit in a matrix that starts at row `start`; it takes every [`ROW_STEP`]th from there.
+/// The first row of this unit in a matrix that starts at row `start`; it takes every [`UNIT_ROW_STEP`]th from there.
 #[cube]
 pub(super) fn first_row(start: usize) -> usize {
-    start + CUBE_POS_Y as usize * BLOCK + UNIT_POS as usize / LANES
+    start + CUBE_POS_Y as usize * ROWS_PER_SUM + UNIT_POS as usize / GROUP_COLUMNS
 }
 
 /// One past the last row of this group.
 #[cube]
 pub(super) fn end_row(start: usize, end: usize) -> usize {
-    let block_end = start + (CUBE_POS_Y as usize + 1) * BLOCK;
+    let block_end = start + (CUBE_POS_Y as usize + 1) * ROWS_PER_SUM;
     select(block_end < end, block_end, end)
 }
 
@@ -46,11 +47,11 @@ pub(super) fn write_block<N: Size>(sum: Vector<f32, N>, partial: &mut [Vector<f3
     let mut sums = Shared::<[Vector<f32, N>]>::new_slice(comptime!(UNITS as usize));
     sums[UNIT_POS as usize] = sum;
     sync_cube();
-    if UNIT_POS < LANES as u32 {
+    if UNIT_POS < GROUP_COLUMNS as u32 {
         let mut total = sum;
         #[unroll]
-        for row in 1..ROW_STEP {
-            total += sums[row * LANES + UNIT_POS as usize];
+        for row in 1..UNIT_ROW_STEP {
+            total += sums[row * GROUP_COLUMNS + UNIT_POS as usize];
         }
         if column() < vectors {
             partial[CUBE_POS_Y as usize * vectors + column()] = total;
@@ -72,7 +73,7 @@ fn column_sums<N: Size>(
         let end = end_row(start, end);
         while row < end {
             sum += matrix[row * vectors + column()];
-            row += ROW_STEP;
+            row += UNIT_ROW_STEP;
         }
     }
     write_block::<N>(sum, partial, vectors);
@@ -96,7 +97,7 @@ pub(super) fn total(matrix: Matrix) -> Matrix {
 pub(super) fn total_of(matrix: &Matrix, rows: Range<usize>) -> Matrix {
     assert!(!rows.is_empty(), "a sum of no rows");
     let width = matrix.width();
-    let partial = matrix.empty(rows.len().div_ceil(BLOCK), matrix.columns);
+    let partial = matrix.empty(rows.len().div_ceil(ROWS_PER_SUM), matrix.columns);
     let (count, dim) = blocks(rows.len(), matrix.columns / width);
     // SAFETY: units beyond the last column or row read and write nothing.
     unsafe {

@@ -1,10 +1,40 @@
 //! Gradient features of DiffusionNet.
 
+use burn::backend::Cube;
+use burn::tensor::Tensor;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
 use super::math::tanh;
-use super::{GpuTensor, Matrix, groups};
+use super::matrix::{GpuTensor, Matrix, groups};
+use crate::ops::operation::{Operation, Saves, TensorKernel, apply};
+use crate::ops::tensors::Tensors;
+
+/// See [`gradient_features`](crate::ops::gradient_features()).
+pub(in crate::ops) fn gradient_features(mixed: Tensor<2>) -> Tensor<2> {
+    apply(GradientFeatures, [mixed])
+}
+
+/// Argument: mixed gradients.
+#[derive(Clone, Copy, Debug)]
+struct GradientFeatures;
+
+impl TensorKernel for GradientFeatures {
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        let [mixed] = arguments.take();
+        [features(mixed)].into()
+    }
+}
+
+impl Operation<1> for GradientFeatures {
+    fn saves(&self, _: [bool; 1]) -> Saves<1> {
+        Saves { arguments: [true], result: true }
+    }
+
+    fn gradients_on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        [gradients(arguments.take())].into()
+    }
+}
 
 #[cube(launch_unchecked)]
 fn forward<N: Size>(
@@ -23,8 +53,7 @@ fn forward<N: Size>(
     }
 }
 
-/// See [`gradient_features`](super::super::gradient_features()).
-pub(in crate::ops) fn gradient_features(mixed: GpuTensor) -> GpuTensor {
+fn features(mixed: GpuTensor) -> GpuTensor {
     let mixed = Matrix::new(mixed);
     let output = mixed.empty(mixed.rows / 2, mixed.columns / 3);
     let width = output.width();
@@ -73,7 +102,7 @@ fn backward<N: Size>(
 }
 
 /// Gradient of the mixed gradients from these, the features and the gradient of the features.
-pub(in crate::ops) fn feature_gradients(arguments: [GpuTensor; 3]) -> GpuTensor {
+fn gradients(arguments: [GpuTensor; 3]) -> GpuTensor {
     let [mixed, features, gradient] = arguments.map(Matrix::new);
     features.assert_like([&gradient]);
     mixed.assert_size(2 * features.rows, 3 * features.columns);

@@ -6,7 +6,7 @@ use burn_cubecl::cubecl;
 use burn_cubecl::kernel::into_contiguous;
 use cubecl::prelude::*;
 
-use super::{GpuTensor, UNITS, empty, groups};
+use super::matrix::{GpuTensor, Matrix, UNITS, buffer, empty, groups};
 
 /// Most groups that add up one tensor.
 const MOST_GROUPS: usize = 64;
@@ -53,8 +53,8 @@ fn launch_sums(values: &GpuTensor, partial: &GpuTensor, offset: usize, groups: u
             &values.client,
             CubeCount::Static(groups as u32, 1, 1),
             CubeDim::new_1d(UNITS),
-            super::buffer(values, count, 1),
-            super::buffer(partial, partials, 1),
+            buffer(values, count, 1),
+            buffer(partial, partials, 1),
             count,
             offset,
             groups,
@@ -89,22 +89,21 @@ fn scaled(values: &[f32], factor: &[f32], output: &mut [f32], count: usize) {
 
 /// `values` times the only element of `factor`.
 pub(in crate::ops) fn scale(values: GpuTensor, factor: GpuTensor) -> GpuTensor {
-    let shape = values.shape();
-    let [values, factor] = [values, factor].map(into_contiguous);
-    let output = empty(&values, shape.clone());
-    let count = shape.num_elements();
-    let (groups, dim) = groups(&values.client, count);
+    let [values, factor] = [values, factor].map(Matrix::new);
+    factor.assert_size(1, 1);
+    let output = values.like();
+    let (groups, dim) = groups(values.client(), values.count());
     // SAFETY: units beyond the last entry do nothing.
     unsafe {
         scaled::launch_unchecked(
-            &values.client,
+            values.client(),
             groups,
             dim,
-            super::buffer(&values, count, 1),
-            super::buffer(&factor, 1, 1),
-            super::buffer(&output, count, 1),
-            count,
+            values.argument(1),
+            factor.argument(1),
+            output.argument(1),
+            values.count(),
         );
     }
-    output
+    output.tensor
 }

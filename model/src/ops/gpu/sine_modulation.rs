@@ -1,11 +1,47 @@
 //! One layer of a modulated SIREN after its matrix product.
 
+use burn::backend::Cube;
+use burn::tensor::Tensor;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::column_sums::{BLOCK, ROW_STEP, blocks, column, end_row, first_row, total, write_block};
+use super::column_sums::{
+    ROWS_PER_SUM, UNIT_ROW_STEP, blocks, column, end_row, first_row, total, write_block,
+};
 use super::math::sin_cos;
-use super::{GpuTensor, Matrix, groups};
+use super::matrix::{GpuTensor, Matrix, groups};
+use crate::ops::operation::{Operation, Saves, TensorKernel, apply};
+use crate::ops::tensors::Tensors;
+
+/// See [`sine_modulation`](crate::ops::sine_modulation()).
+///
+/// The backward pass computes the phase again instead of keeping sine and cosine: both come from one polynomial, while two more
+/// matrices would have to be written and read.
+pub(in crate::ops) fn sine_modulation(arguments: [Tensor<2>; 3], omega: f64) -> Tensor<2> {
+    apply(SineModulation { omega }, arguments)
+}
+
+/// Arguments: input, bias, gate.
+#[derive(Clone, Copy, Debug)]
+struct SineModulation {
+    omega: f64,
+}
+
+impl TensorKernel for SineModulation {
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        [modulate(arguments.take(), self.omega)].into()
+    }
+}
+
+impl Operation<3> for SineModulation {
+    fn saves(&self, _: [bool; 3]) -> Saves<3> {
+        Saves { arguments: [true; 3], result: false }
+    }
+
+    fn gradients_on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        gradients(arguments.take(), self.omega).into()
+    }
+}
 
 #[cube(launch_unchecked)]
 fn forward<N: Size>(
@@ -25,8 +61,7 @@ fn forward<N: Size>(
     }
 }
 
-/// `sin(omega·(input + bias)) ⊙ gate`: input and gate `[N,C]`, bias `[1,C]`.
-pub(in crate::ops) fn sine_modulation([input, bias, gate]: [GpuTensor; 3], omega: f64) -> GpuTensor {
+fn modulate([input, bias, gate]: [GpuTensor; 3], omega: f64) -> GpuTensor {
     let [input, bias, gate] = [input, bias, gate].map(Matrix::new);
     input.assert_like([&gate]);
     bias.assert_size(1, input.columns);
@@ -79,20 +114,20 @@ fn backward<N: Size>(
             of_gate[i] = sine * gradient[i];
             of_input[i] = inner;
             sum += inner;
-            row += ROW_STEP;
+            row += UNIT_ROW_STEP;
         }
     }
     write_block::<N>(sum, partial, vectors);
 }
 
 /// Gradients of input, bias and gate from these and the gradient of the result.
-pub(in crate::ops) fn sine_gradients(arguments: [GpuTensor; 4], omega: f64) -> [GpuTensor; 3] {
+fn gradients(arguments: [GpuTensor; 4], omega: f64) -> [GpuTensor; 3] {
     let [input, bias, gate, gradient] = arguments.map(Matrix::new);
     input.assert_like([&gate, &gradient]);
     bias.assert_size(1, input.columns);
     let (rows, columns, width) = (input.rows, input.columns, input.width());
     let [of_input, of_gate] = [(); 2].map(|()| input.empty(rows, columns));
-    let partial = input.empty(rows.div_ceil(BLOCK), columns);
+    let partial = input.empty(rows.div_ceil(ROWS_PER_SUM), columns);
     let (count, dim) = blocks(rows, columns / width);
     // SAFETY: units beyond the last column or row do nothing.
     unsafe {

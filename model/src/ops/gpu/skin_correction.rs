@@ -3,7 +3,7 @@
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::{GpuTensor, Matrix, groups};
+use super::matrix::{GpuTensor, Matrix, groups};
 use crate::packing::Packing;
 
 #[cube(launch_unchecked)]
@@ -44,7 +44,7 @@ fn project(
     }
 }
 
-/// `base + scale·P(values)`; see [`skin_correction`](super::super::skin_correction()).
+/// `base + scale·P(values)`; see [`skin_correction`](crate::ops::skin_correction()).
 pub(in crate::ops) fn projection(
     [mask, values]: [GpuTensor; 2],
     base: Option<GpuTensor>,

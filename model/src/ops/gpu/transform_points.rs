@@ -3,7 +3,7 @@
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::{GpuTensor, Matrix, groups};
+use super::matrix::{GpuTensor, Matrix, groups};
 
 #[cube(launch_unchecked)]
 fn forward(transforms: &[f32], points: &[f32], output: &mut [f32], rows: usize) {
@@ -22,7 +22,7 @@ fn forward(transforms: &[f32], points: &[f32], output: &mut [f32], rows: usize) 
     }
 }
 
-/// `R_n p_n + t_n`; see [`transform_points`](super::super::transform_points()).
+/// `R_n p_n + t_n`; see [`transform_points`](crate::ops::transform_points()).
 pub(in crate::ops) fn transform_points(arguments: [GpuTensor; 2]) -> GpuTensor {
     let [transforms, points] = arguments.map(Matrix::new);
     points.assert_size(points.rows, 3);

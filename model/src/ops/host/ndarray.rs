@@ -1,34 +1,38 @@
-//! Tensors of burn's ndarray backend, which lends no memory.
+//! Tensors of burn's ndarray backend.
 
 // burn deprecates the backend but still ships it, and users ask for it.
 #![allow(deprecated)]
 
-use burn::backend::ops::FloatTensorOps;
+use burn::backend::NdArray;
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{NdArray, TensorMetadata};
 
 use super::{HostBackend, MatrixView};
 
-/// Elements copied out of a matrix, with its width.
-pub(in crate::ops) struct Copied {
-    values: Vec<f32>,
-    columns: usize,
-}
+type NdArrayTensor = FloatTensor<NdArray>;
 
 impl HostBackend for NdArray {
-    type Held = Copied;
-
-    fn hold(tensor: FloatTensor<Self>) -> Self::Held {
-        let columns = tensor.shape()[1];
-        let data = burn::backend::read_sync(Self::float_into_data(tensor));
-        // Reading host memory cannot fail, and the caller has checked the element type.
-        let values = data.ok().and_then(|data| data.try_into_vec::<f32>().ok()).unwrap_or_default();
-        Copied { values, columns }
+    fn hold(mut matrix: NdArrayTensor) -> NdArrayTensor {
+        Self::values(&mut matrix);
+        matrix
     }
 
-    fn view(held: &Self::Held) -> MatrixView<'_> {
-        let columns = held.columns;
-        let rows = held.values.len() / columns.max(1);
-        MatrixView { values: &held.values, row_stride: columns, columns, rows }
+    fn view(held: &NdArrayTensor) -> MatrixView<'_> {
+        let NdArrayTensor::F32(storage) = held else { panic!("a matrix of f32") };
+        let values = storage.view().to_slice().expect("held matrices are in row-major order");
+        MatrixView::of_rows(values, storage.shape()[1])
+    }
+
+    fn values(tensor: &mut NdArrayTensor) -> &[f32] {
+        let NdArrayTensor::F32(storage) = tensor else { panic!("a tensor of f32") };
+        if !storage.view().is_standard_layout() {
+            *storage = storage.view().as_standard_layout().to_shared().into();
+        }
+        storage.view().to_slice().expect("it is in row-major order")
+    }
+
+    fn values_mut(tensor: &mut NdArrayTensor) -> &mut [f32] {
+        Self::values(tensor);
+        let NdArrayTensor::F32(storage) = tensor else { panic!("a tensor of f32") };
+        storage.ensure_owned().as_slice_mut().expect("it is in row-major order")
     }
 }

@@ -1,10 +1,15 @@
-//! The factors of a product, and how a group reads its tiles of them.
+//! The factors of a product, and how a group of units reads its tiles of them.
 
 use burn::backend::TensorMetadata;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::{GpuTensor, Matrix};
+use crate::ops::gpu::matrix::{GpuTensor, Matrix};
+
+/// Units of a group, of either kernel.
+pub(super) const PRODUCT_UNITS: usize = 256;
+/// Rows and columns of the result that one group computes.
+pub(super) const TILE: usize = 128;
 
 /// A factor, held in memory as it is or transposed.
 pub(super) struct Factor {

@@ -12,25 +12,24 @@ use cubecl::ir::{ElemType, FloatKind};
 use cubecl::prelude::*;
 use half::bf16;
 
-use super::factor::{Transposed, read_tile};
-use super::{TILE, UNITS};
+use super::factor::{PRODUCT_UNITS, TILE, Transposed, read_tile};
 
 /// Terms of the sum that a tile holds.
-pub(super) const DEPTH: usize = 32;
+pub(super) const CMMA_DEPTH: usize = 32;
 /// Rows, columns and terms of what a matrix unit multiplies at once.
 const FRAGMENT: usize = 16;
 /// Units of a plane.
 const PLANE: usize = 32;
 /// Planes of a group, along rows and columns of its tile.
 const PLANES: [usize; 2] = [2, 4];
-const _: () = assert!(PLANES[0] * PLANES[1] * PLANE == UNITS);
+const _: () = assert!(PLANES[0] * PLANES[1] * PLANE == PRODUCT_UNITS);
 /// Fragments of the result that a plane computes, along rows and columns.
 const FRAGMENTS: [usize; 2] = [TILE / PLANES[0] / FRAGMENT, TILE / PLANES[1] / FRAGMENT];
 /// Entries between the lines of a tile, so that they start in different banks of memory.
 const PADDING: usize = 8;
 
 /// Bytes of shared memory: both factors' tiles in two parts, with the padding that is larger, and the bounce.
-const SHARED: usize = 4 * 2 * TILE * (DEPTH + PADDING) + 4 * UNITS / PLANE * FRAGMENT * FRAGMENT;
+const SHARED: usize = 4 * 2 * TILE * (CMMA_DEPTH + PADDING) + 4 * PRODUCT_UNITS / PLANE * FRAGMENT * FRAGMENT;
 
 /// Whether a device has units for this, and groups large enough.
 pub(super) fn are_in(client: &Client) -> bool {
@@ -39,7 +38,8 @@ pub(super) fn are_in(client: &Client) -> bool {
     let wanted = MmaConfig { a_type: bf16, b_type: bf16, cd_type: f32, m: size, n: size, k: size };
     let hardware = &client.properties().hardware;
     let planes = [hardware.plane_size_min, hardware.plane_size_max];
-    let is_large = hardware.max_shared_memory_size >= SHARED && hardware.max_units_per_cube as usize >= UNITS;
+    let is_large =
+        hardware.max_shared_memory_size >= SHARED && hardware.max_units_per_cube as usize >= PRODUCT_UNITS;
     is_large && planes == [PLANE as u32; 2] && client.features().matmul.cmma.contains(&wanted)
 }
 
@@ -62,7 +62,7 @@ fn write_tile<N: Size>(
     let pitch = comptime!((inner + PADDING) / width);
     #[unroll]
     for i in 0..count {
-        let position = UNIT_POS as usize + i * UNITS;
+        let position = UNIT_POS as usize + i * PRODUCT_UNITS;
         let at = position / per_line * pitch + position % per_line;
         let value = registers[i];
         let rounded = rounded_to_bf16::<N>(value);
@@ -120,9 +120,9 @@ pub(super) fn multiply<N: Size>(
     #[comptime] transposed: Transposed,
 ) {
     let width = N::value();
-    let [lhs_outer, lhs_inner] = comptime!(lines(TILE, DEPTH, transposed.lhs));
-    let [rhs_outer, rhs_inner] = comptime!(lines(DEPTH, TILE, transposed.rhs));
-    let count = comptime!(TILE * DEPTH / width / UNITS);
+    let [lhs_outer, lhs_inner] = comptime!(lines(TILE, CMMA_DEPTH, transposed.lhs));
+    let [rhs_outer, rhs_inner] = comptime!(lines(CMMA_DEPTH, TILE, transposed.rhs));
+    let count = comptime!(TILE * CMMA_DEPTH / width / PRODUCT_UNITS);
     let lhs_size = comptime!(lhs_outer * (lhs_inner + PADDING) / width);
     let rhs_size = comptime!(rhs_outer * (rhs_inner + PADDING) / width);
     let mut lhs_high = Shared::<[Vector<bf16, N>]>::new_aligned_slice(lhs_size, 16usize);
@@ -174,7 +174,7 @@ pub(super) fn multiply<N: Size>(
         write_tile::<N>(&lhs_registers, &mut lhs_high, &mut lhs_low, lhs_inner, count);
         write_tile::<N>(&rhs_registers, &mut rhs_high, &mut rhs_low, rhs_inner, count);
         sync_cube();
-        at += DEPTH;
+        at += CMMA_DEPTH;
         // The next tile is on its way while this one is multiplied.
         if at < end {
             read_factors::<N>(
@@ -194,7 +194,7 @@ pub(super) fn multiply<N: Size>(
             );
         }
         #[unroll]
-        for step in 0..comptime!(DEPTH / FRAGMENT) {
+        for step in 0..comptime!(CMMA_DEPTH / FRAGMENT) {
             let along = step * FRAGMENT;
             let mut highs = Sequence::<cmma::Matrix<bf16>>::new();
             let mut lows = Sequence::<cmma::Matrix<bf16>>::new();
@@ -229,7 +229,7 @@ pub(super) fn multiply<N: Size>(
 
     // Fragments that reach beyond the result, or whose lines are not aligned, go through memory of their plane.
     let mut bounce =
-        Shared::<[f32]>::new_aligned_slice(comptime!(UNITS / PLANE * FRAGMENT * FRAGMENT), 16usize);
+        Shared::<[f32]>::new_aligned_slice(comptime!(PRODUCT_UNITS / PLANE * FRAGMENT * FRAGMENT), 16usize);
     let mine = plane * comptime!(FRAGMENT * FRAGMENT);
     let base = CUBE_POS_Z as usize * rows * columns;
     let output_end = output.len();
@@ -285,14 +285,50 @@ fn read_factors<N: Size>(
 ) {
     let unit = UNIT_POS as usize;
     if comptime!(transposed.lhs) {
-        read_tile::<N>(lhs, lhs_registers, unit, at, end, row_start, rows, rows, TILE, count, UNITS);
+        read_tile::<N>(lhs, lhs_registers, unit, at, end, row_start, rows, rows, TILE, count, PRODUCT_UNITS);
     } else {
-        read_tile::<N>(lhs, lhs_registers, unit, row_start, rows, at, end, depth, DEPTH, count, UNITS);
+        read_tile::<N>(
+            lhs,
+            lhs_registers,
+            unit,
+            row_start,
+            rows,
+            at,
+            end,
+            depth,
+            CMMA_DEPTH,
+            count,
+            PRODUCT_UNITS,
+        );
     }
     if comptime!(transposed.rhs) {
-        read_tile::<N>(rhs, rhs_registers, unit, column_start, columns, at, end, depth, DEPTH, count, UNITS);
+        read_tile::<N>(
+            rhs,
+            rhs_registers,
+            unit,
+            column_start,
+            columns,
+            at,
+            end,
+            depth,
+            CMMA_DEPTH,
+            count,
+            PRODUCT_UNITS,
+        );
     } else {
-        read_tile::<N>(rhs, rhs_registers, unit, at, end, column_start, columns, columns, TILE, count, UNITS);
+        read_tile::<N>(
+            rhs,
+            rhs_registers,
+            unit,
+            at,
+            end,
+            column_start,
+            columns,
+            columns,
+            TILE,
+            count,
+            PRODUCT_UNITS,
+        );
     }
 }
 

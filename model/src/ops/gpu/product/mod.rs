@@ -10,8 +10,9 @@ mod plain;
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::{GpuTensor, Matrix};
-use factor::{Factor, Sizes, Transposed};
+use super::column_sums::total;
+use super::matrix::GpuTensor;
+use factor::{Factor, PRODUCT_UNITS, Sizes, TILE, Transposed};
 
 /// Groups that keep a large GPU busy: two on each of its 132 multiprocessors.
 const ENOUGH_GROUPS: usize = 264;
@@ -19,14 +20,11 @@ const ENOUGH_GROUPS: usize = 264;
 const SMALLEST_CHUNK: usize = 128;
 /// Both kernels' tiles divide it.
 const CHUNK_MULTIPLE: usize = 32;
-const _: () = assert!(CHUNK_MULTIPLE % matrix_units::DEPTH == 0 && CHUNK_MULTIPLE % plain::DEPTH == 0);
+const _: () =
+    assert!(CHUNK_MULTIPLE % matrix_units::CMMA_DEPTH == 0 && CHUNK_MULTIPLE % plain::PLAIN_DEPTH == 0);
 /// Entries of a result beyond which its tiles keep a GPU busy anyway, and adding up chunks would need more groups along a
 /// dimension than the graphics APIs grant (65,535, for 32 entries each).
 const LARGEST_CHUNKED: usize = 32 * 65_535;
-/// Units of a group, of either kernel.
-const UNITS: usize = 256;
-/// Rows and columns of the result that one group computes.
-const TILE: usize = 128;
 
 /// `lhs·rhs`, from matrices in memory as they are or transposed; other views are copied first.
 ///
@@ -59,7 +57,7 @@ pub(in crate::ops) fn product(lhs: GpuTensor, rhs: GpuTensor) -> GpuTensor {
         multiply(
             output.client(),
             groups,
-            CubeDim::new_1d(UNITS as u32),
+            CubeDim::new_1d(PRODUCT_UNITS as u32),
             width,
             lhs.matrix.argument(width),
             rhs.matrix.argument(width),
@@ -71,7 +69,7 @@ pub(in crate::ops) fn product(lhs: GpuTensor, rhs: GpuTensor) -> GpuTensor {
             Transposed { lhs: lhs.transposed, rhs: rhs.transposed },
         );
     }
-    let sum = super::column_sums::total(output).tensor;
+    let sum = total(output).tensor;
     GpuTensor::new_contiguous(
         sum.client,
         sum.device,

@@ -3,15 +3,14 @@
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::factor::Transposed;
-use super::{TILE, UNITS};
+use super::factor::{PRODUCT_UNITS, TILE, Transposed};
 
 /// Terms of the sum that a tile holds.
-pub(super) const DEPTH: usize = 16;
+pub(super) const PLAIN_DEPTH: usize = 16;
 /// Units of a line of a group.
-const LINE: usize = 16;
+const LINE_UNITS: usize = 16;
 /// Units that read one factor; the others read the other one.
-const READERS: usize = UNITS / 2;
+const READERS: usize = PRODUCT_UNITS / 2;
 /// Entries that lie together in a tile.
 const FOUR: usize = 4;
 /// Vectors between the lines of a tile, so that they start in different banks of memory.
@@ -33,7 +32,7 @@ fn read_block<N: Size>(
     pitch: usize,
 ) {
     let width = N::value();
-    let per_line = comptime!(if along_is_fast { DEPTH / FOUR } else { TILE / FOUR });
+    let per_line = comptime!(if along_is_fast { PLAIN_DEPTH / FOUR } else { TILE / FOUR });
     let slow = unit / per_line * FOUR;
     let fast = unit % per_line * FOUR;
     #[unroll]
@@ -74,7 +73,7 @@ fn read_block<N: Size>(
     }
 }
 
-/// Where [`read_block`] read, in a tile `[DEPTH][TILE]`.
+/// Where [`read_block`] read, in a tile `[PLAIN_DEPTH][TILE]`.
 #[cube]
 fn write_block(
     block: &Array<Vector<f32, Const<4>>>,
@@ -82,7 +81,7 @@ fn write_block(
     unit: usize,
     #[comptime] along_is_fast: bool,
 ) {
-    let per_line = comptime!(if along_is_fast { DEPTH / FOUR } else { TILE / FOUR });
+    let per_line = comptime!(if along_is_fast { PLAIN_DEPTH / FOUR } else { TILE / FOUR });
     let (slow, fast) = (unit / per_line, unit % per_line);
     let (along, across) = if comptime!(along_is_fast) { (fast * FOUR, slow) } else { (slow * FOUR, fast) };
     #[unroll]
@@ -104,15 +103,15 @@ pub(super) fn multiply<N: Size>(
     #[comptime] transposed: Transposed,
 ) {
     let mut lhs_tile =
-        Shared::<[Vector<f32, Const<4>>]>::new_aligned_slice(comptime!(DEPTH * PITCH), 16usize);
+        Shared::<[Vector<f32, Const<4>>]>::new_aligned_slice(comptime!(PLAIN_DEPTH * PITCH), 16usize);
     let mut rhs_tile =
-        Shared::<[Vector<f32, Const<4>>]>::new_aligned_slice(comptime!(DEPTH * PITCH), 16usize);
+        Shared::<[Vector<f32, Const<4>>]>::new_aligned_slice(comptime!(PLAIN_DEPTH * PITCH), 16usize);
     let row_start = CUBE_POS_Y as usize * TILE;
     let column_start = CUBE_POS_X as usize * TILE;
     let start = CUBE_POS_Z as usize * chunk;
     let end = select(start + chunk < depth, start + chunk, depth);
     let unit = UNIT_POS as usize;
-    let (unit_row, unit_column) = (unit / LINE, unit % LINE);
+    let (unit_row, unit_column) = (unit / LINE_UNITS, unit % LINE_UNITS);
 
     // Sums [half of rows][row][half of columns], four columns each.
     let mut sums = Array::<Vector<f32, Const<4>>>::new(16usize);
@@ -143,7 +142,7 @@ pub(super) fn multiply<N: Size>(
             write_block(&block, &mut rhs_tile, unit - READERS, transposed.rhs);
         }
         sync_cube();
-        at += DEPTH;
+        at += PLAIN_DEPTH;
         // The next tile is on its way while this one is multiplied.
         if at < end {
             read_factors::<N>(
@@ -161,13 +160,13 @@ pub(super) fn multiply<N: Size>(
             );
         }
         #[unroll]
-        for term in 0..comptime!(DEPTH) {
+        for term in 0..comptime!(PLAIN_DEPTH) {
             #[unroll]
             for half in 0..2 {
-                let left = lhs_tile[term * PITCH + half * LINE + unit_row];
+                let left = lhs_tile[term * PITCH + half * LINE_UNITS + unit_row];
                 #[unroll]
                 for side in 0..2 {
-                    let right = rhs_tile[term * PITCH + side * LINE + unit_column];
+                    let right = rhs_tile[term * PITCH + side * LINE_UNITS + unit_column];
                     #[unroll]
                     for i in 0..comptime!(FOUR) {
                         let factor = Vector::<f32, Const<4>>::new(left.extract(i));
@@ -184,13 +183,13 @@ pub(super) fn multiply<N: Size>(
     for half in 0..2 {
         #[unroll]
         for i in 0..comptime!(FOUR) {
-            let row = row_start + (half * LINE + unit_row) * FOUR + i;
+            let row = row_start + (half * LINE_UNITS + unit_row) * FOUR + i;
             #[unroll]
             for side in 0..2 {
                 let sum = sums[comptime!((half * FOUR + i) * 2 + side)];
                 #[unroll]
                 for lane in 0..comptime!(FOUR) {
-                    let column = column_start + (side * LINE + unit_column) * FOUR + lane;
+                    let column = column_start + (side * LINE_UNITS + unit_column) * FOUR + lane;
                     if row < rows && column < columns {
                         output[base + row * columns + column] = sum.extract(lane);
                     }

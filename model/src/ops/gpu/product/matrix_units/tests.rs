@@ -1,8 +1,8 @@
-use burn::backend::{Backend, Cube};
+use burn::backend::Cube;
 use burn::tensor::{Tensor, TensorData};
 
 use super::*;
-use crate::ops::gpu::{Matrix, groups};
+use crate::ops::gpu::matrix::{Matrix, groups};
 use crate::ops::operation::{TensorKernel, run};
 use crate::ops::tensors::Tensors;
 use crate::testing::device;
@@ -17,10 +17,6 @@ fn round<N: Size>(values: &[Vector<f32, N>], output: &mut [Vector<f32, N>], coun
 struct Rounding;
 
 impl TensorKernel for Rounding {
-    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        arguments
-    }
-
     fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
         let [values] = arguments.take();
         let values = Matrix::new(values);

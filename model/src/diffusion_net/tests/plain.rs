@@ -3,11 +3,11 @@
 use burn::tensor::Tensor;
 use burn::tensor::activation::relu;
 
-use super::{DiffusionBlock, DiffusionNet};
+use crate::diffusion_net::{DiffusionBlock, DiffusionNet};
 use crate::tensors::GarmentTensors;
 
 /// [`DiffusionNet::forward`] with full-size intermediate features.
-pub fn forward(net: &DiffusionNet, garment: &GarmentTensors) -> Tensor<2> {
+pub(super) fn forward(net: &DiffusionNet, garment: &GarmentTensors) -> Tensor<2> {
     let features = net.first.forward(garment.rest.clone());
     let features =
         net.blocks.iter().fold(features, |features, block| block_forward(block, features, garment));
