@@ -4,10 +4,9 @@
 //! found whose surface lies closest to the other one, by iterated closest points with point-to-plane distances.
 
 use super::body::Body;
+use super::normal_equations::NormalEquations;
 use clothcombo_physics::Surface;
 use clothcombo_physics::vec3::{dot, sub};
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
 use std::sync::Arc;
 
 /// Rounds of closest points.
@@ -61,8 +60,7 @@ pub fn match_shape(
         if k == 0 || round == ROUNDS {
             break;
         }
-        let mut gram = vec![vec![0.0; k]; k];
-        let mut right = vec![0.0; k];
+        let mut equations = NormalEquations::new(k);
         let mut count = 0.0;
         for (sample, found) in closest.iter().enumerate() {
             let Some(found) = found else { continue };
@@ -75,18 +73,12 @@ pub fn match_shape(
                 })
                 .collect();
             // Where the plane would have the template: the shape is solved for anew in every round.
-            let wanted = dot(found.normal, sub(found.position, body.template[v]));
-            for i in 0..k {
-                right[i] += row[i] * wanted;
-                (0..=i).for_each(|j| gram[i][j] += row[i] * row[j]);
-            }
+            equations.add(&row, dot(found.normal, sub(found.position, body.template[v])));
             count += 1.0;
         }
         let prior = PRIOR * TOLERANCE * TOLERANCE * f64::max(count, 1.0);
-        let gram = Mat::from_fn(k, k, |i, j| gram[i.max(j)][i.min(j)] + if i == j { prior } else { 0.0 });
-        let Ok(factor) = gram.llt(Side::Lower) else { break };
-        let solution = factor.solve(Mat::from_fn(k, 1, |i, _| right[i]));
-        shape = (0..k).map(|i| solution[(i, 0)].clamp(range[0], range[1])).collect();
+        let Some(solution) = equations.solution(|_| prior) else { break };
+        shape = solution.into_iter().map(|x| x.clamp(range[0], range[1])).collect();
     }
     ShapeMatch { shape, mean_distance }
 }

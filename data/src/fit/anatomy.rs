@@ -1,12 +1,12 @@
 //! Which parts of the body pass through the openings of a garment, and whether bones pass through its cloth.
 
 use super::body_field::LimbTurn;
-use super::limb_pose::LIMBS as TURNED;
+use super::limb_pose::LIMB_ROOTS;
 use crate::asset::Body;
 use clothcombo_physics::vec3::{add, cross, dot, scale, sub};
 
 /// The ends of the body, each with the joints on the way there from the pelvis.
-const LIMBS: [&[&str]; 5] = [
+const LIMB_CHAINS: [&[&str]; 5] = [
     &["pelvis", "spine1", "spine2", "spine3", "neck", "head"],
     &["pelvis", "spine1", "spine2", "spine3", "left_collar", "left_shoulder", "left_elbow", "left_wrist"],
     &["pelvis", "spine1", "spine2", "spine3", "right_collar", "right_shoulder", "right_elbow", "right_wrist"],
@@ -58,8 +58,8 @@ impl PiercingBones {
 impl Skeleton {
     pub fn new(body: &Body) -> Self {
         Self {
-            limbs: LIMBS.map(|names| names.iter().filter_map(|n| body.joint_place(n)).collect()),
-            roots: std::array::from_fn(|limb| body.joint_place(TURNED[limb / 2][limb % 2])),
+            limbs: LIMB_CHAINS.map(|names| names.iter().filter_map(|n| body.joint_place(n)).collect()),
+            roots: std::array::from_fn(|limb| body.joint_place(LIMB_ROOTS[limb / 2][limb % 2])),
         }
     }
 

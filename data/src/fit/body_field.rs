@@ -1,6 +1,6 @@
 //! The T-posed body as the placement search sees it: signed distances on grids, with limbs that turn at shoulders and hips.
 
-use super::limb_pose::{LIMBS, LimbPose};
+use super::limb_pose::{LIMB_ROOTS, LimbPose};
 use super::placement::Placement;
 use crate::asset::Body;
 use crate::generate::garment::Tube;
@@ -11,9 +11,9 @@ use clothcombo_physics::{Topology, TriMesh};
 use std::sync::Arc;
 
 /// Node spacing of the grids (m).
-const STEP: f64 = 0.02;
+const FIELD_STEP: f64 = 0.02;
 /// Largest distance the grids tell (m): cloth farther away says nothing about where it belongs.
-const BAND: f64 = 0.25;
+const FIELD_BAND: f64 = 0.25;
 
 /// Signed distance to the body with its arms lowered by any angle.
 ///
@@ -38,7 +38,7 @@ pub(super) struct BodyField {
 }
 
 /// Parts of the body on which cloth may lie differently: legs, hips, chest, shoulders and neck, arms.
-pub(super) const PARTS: usize = 5;
+pub(super) const BODY_PARTS: usize = 5;
 
 /// Heights of the zero body (m).
 #[derive(Clone, Copy, Debug)]
@@ -100,7 +100,7 @@ impl Turn {
 
 impl BodyField {
     pub fn new(body: &Body) -> Self {
-        let side_of_joint = sides(body, LIMBS[0]);
+        let side_of_joint = sides(body, LIMB_ROOTS[0]);
         let side = |face: &[u32; 3]| {
             let mut share = [0.0; 2];
             for v in face {
@@ -118,7 +118,7 @@ impl BodyField {
         let [left, right, trunk] = &parts;
         let distance = |faces: &[[u32; 3]]| {
             let (positions, faces, radius) = closed(&body.template, faces);
-            (DistanceGrid::new(&positions, &faces, STEP, BAND), radius)
+            (DistanceGrid::new(&positions, &faces, FIELD_STEP, FIELD_BAND), radius)
         };
         let (trunk, (left, right)) = rayon::join(
             || distance(trunk).0,
@@ -147,7 +147,7 @@ impl BodyField {
         let spine: Vec<f64> = spine.into_iter().flatten().map(|p| p[2]).collect();
         let spine_z = spine.iter().sum::<f64>() / spine.len().max(1) as f64;
         let arms = left.into_iter().chain(right).collect();
-        let [left, right] = LIMBS[1].map(|name| body.joint_place(name));
+        let [left, right] = LIMB_ROOTS[1].map(|name| body.joint_place(name));
         let hips = left.zip(right).map(<[_; 2]>::from);
         let (trunk, form, weights) = (trunk.into(), form.into(), [None, None]);
         Self { trunk, form, arms, hips, weights, levels, low, high, spine_z }
@@ -158,7 +158,7 @@ impl BodyField {
     pub fn posed(&self, posed: &LimbPose, body: &Body) -> Self {
         let weights = std::array::from_fn(|limb| {
             let is_turned = posed.angles[limb] != 0.0;
-            is_turned.then(|| Arc::new(limb_weights(body, &posed.positions, LIMBS[limb])))
+            is_turned.then(|| Arc::new(limb_weights(body, &posed.positions, LIMB_ROOTS[limb])))
         });
         Self { weights, ..self.clone() }
     }
@@ -170,7 +170,7 @@ impl BodyField {
     }
 
     /// Signed distance of `p` to the body as taut cloth sees it (m), outside positive, at most the band of the grids; and the
-    /// part of the body that is next to it, below [`PARTS`].
+    /// part of the body that is next to it, below [`BODY_PARTS`].
     pub fn gap(&self, p: [f64; 3], turn: LimbTurn) -> (f64, usize) {
         let arm = self.weights[0].as_ref().map_or(0.0, |grid| grid.distance(p));
         let p = self.legs_together(p, turn.legs);
@@ -186,7 +186,7 @@ impl BodyField {
             let raised = arms.undone(p, arm.shoulder, arm.side);
             let distance = arm.distance.distance(raised).min(norm(sub(p, arm.shoulder)) - arm.radius);
             if distance < gap {
-                (gap, part) = (distance, PARTS - 1);
+                (gap, part) = (distance, BODY_PARTS - 1);
             }
         }
         (gap, part)
@@ -244,7 +244,7 @@ fn limb_weights(body: &Body, posed: &[[f64; 3]], from: [&str; 2]) -> DistanceGri
         };
         body.faces[face].iter().map(of_vertex).sum::<f64>() / 3.0
     };
-    DistanceGrid::with_attribute(posed, &body.faces, STEP, BAND, weight).1
+    DistanceGrid::with_attribute(posed, &body.faces, FIELD_STEP, FIELD_BAND, weight).1
 }
 
 /// A trunk whose outlines are convex between hips and armpits, as taut cloth spans it.
@@ -263,7 +263,7 @@ fn arm(
     side: usize,
     distance: &dyn Fn(&[[u32; 3]]) -> (DistanceGrid, f64),
 ) -> Option<Arm> {
-    let shoulder = body.joint_place(LIMBS[0][side]).filter(|_| !faces.is_empty())?;
+    let shoulder = body.joint_place(LIMB_ROOTS[0][side]).filter(|_| !faces.is_empty())?;
     let (distance, radius) = distance(faces);
     Some(Arm { side: [1.0, -1.0][side], shoulder, radius: 0.9 * radius, distance })
 }
@@ -324,13 +324,14 @@ mod tests {
         let field = BodyField::new(&body);
         for degrees in [0.0, 45.0] {
             let placement = Placement { arm_angle_degrees: degrees, ..Placement::AS_GIVEN };
-            let (turn, posed) = (LimbTurn::of(&placement), LimbPose::of(&body, &placement));
+            let turn = LimbTurn::of(&placement);
+            let surface = LimbPose::of(&body, &placement).surface(&body);
             let mut errors: Vec<f64> = (0..3000)
                 .map(|i| {
                     let t = [0.754_877_666, 0.569_840_291, 0.438_579_021].map(|s| (s * f64::from(i)).fract());
                     let p = std::array::from_fn(|k| field.low[k] + t[k] * (field.high[k] - field.low[k]));
-                    let exact = posed.surface.gap(p, Distance::ClosestPoint).gap;
-                    (field.gap(p, turn).0 - exact.min(BAND)).abs()
+                    let exact = surface.gap(p, Distance::ClosestPoint).gap;
+                    (field.gap(p, turn).0 - exact.min(FIELD_BAND)).abs()
                 })
                 .collect();
             errors.sort_by(f64::total_cmp);

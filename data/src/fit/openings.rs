@@ -6,11 +6,11 @@ use super::judge::{Candidate, Judge, UNWORN};
 use super::placement::Placement;
 
 /// A border deeper inside the body than this (m), for a larger share of its length, goes around nothing.
-const DEPTH: f64 = 0.012;
-const SHARE: f64 = 0.25;
+const RUNS_THROUGH_DEPTH: f64 = 0.012;
+const RUNS_THROUGH_SHARE: f64 = 0.25;
 
 /// A limb passes through openings longer than this (m): a child's wrist.
-const NARROWEST: f64 = 0.2;
+const NARROWEST_OPENING: f64 = 0.2;
 
 /// A border of a placed garment.
 struct Border {
@@ -44,7 +44,7 @@ impl Limbs {
 }
 
 /// What is not the trunk.
-const LIMBS: [Opening; 6] = [
+const AROUND_LIMBS: [Opening; 6] = [
     Opening::Neck,
     Opening::LeftArm,
     Opening::RightArm,
@@ -55,7 +55,7 @@ const LIMBS: [Opening; 6] = [
 
 /// Whether a garment with this many openings around the trunk, and these others, is worn around it.
 fn goes_around(trunk: usize, has: &dyn Fn(Opening) -> bool) -> bool {
-    trunk >= 2 || (trunk > 0 && LIMBS.into_iter().any(has))
+    trunk >= 2 || (trunk > 0 && AROUND_LIMBS.into_iter().any(has))
 }
 
 impl Judge<'_> {
@@ -65,10 +65,11 @@ impl Judge<'_> {
         let of_border = |border: usize| {
             let points = placement.apply(&self.cloth.border(border));
             let count = points.len().max(1) as f64;
-            let inside = points.iter().filter(|p| self.field.is_inside(**p, turn, DEPTH)).count();
+            let inside =
+                points.iter().filter(|p| self.field.is_inside(**p, turn, RUNS_THROUGH_DEPTH)).count();
             let linked = self.skeleton.opening(&points, turn);
             Border {
-                opening: if inside as f64 > SHARE * count { Opening::Nothing } else { linked },
+                opening: if inside as f64 > RUNS_THROUGH_SHARE * count { Opening::Nothing } else { linked },
                 linked,
                 height: points.iter().map(|p| p[1]).sum::<f64>() / count,
             }
@@ -111,9 +112,9 @@ impl Judge<'_> {
         };
         let hem = longest(Opening::Trunk);
         candidate.neck_over_hem = if hem > 0.0 { longest(Opening::Neck) / hem } else { 0.0 };
-        candidate.is_tube = count(Opening::Trunk) == 2 && !LIMBS.into_iter().any(has);
+        candidate.is_tube = count(Opening::Trunk) == 2 && !AROUND_LIMBS.into_iter().any(has);
         let is_wide = |border: &usize| {
-            self.cloth.border_lengths[*border] * candidate.placement.unit.metres() > NARROWEST
+            self.cloth.border_lengths[*border] * candidate.placement.unit.metres() > NARROWEST_OPENING
         };
         let is_idle = |border: &usize| openings[*border].opening == Opening::Nothing && is_wide(border);
         candidate.idle_openings = (0..openings.len()).filter(is_idle).count();

@@ -19,7 +19,7 @@ const OPEN_GAP: f64 = 0.01;
 /// They are at least this long (m).
 const OPEN_LENGTH: f64 = 0.06;
 /// A vertex whose shortest edge is this many times the median one does not belong to the mesh.
-const FAR: f64 = 20.0;
+const FAR_EDGES: f64 = 20.0;
 /// Most such vertices.
 const MOST_FAR: usize = 8;
 /// The outer sheet of cloth with thickness has from one to the other share of the area.
@@ -88,7 +88,10 @@ fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
     let faces: Vec<[u32; 3]> = clean.kept.iter().map(|f| renumbered[*f as usize]).collect();
     let corners = clean.kept.iter().map(|f| cut.corners[*f as usize].map(Corner::own)).collect();
     let face_origin = clean.kept.iter().map(|f| cut.polygon[*f as usize]).collect();
-    let mut sheet = Sheet::new(welded.positions, faces, face_origin, corners, compact);
+    let turned = vec![false; faces.len()];
+    let positions = welded.positions;
+    let mut sheet =
+        Sheet { positions, faces, face_origin, corners, turned, welded: compact, ..Sheet::default() };
     let made = oriented(&mut sheet);
 
     let file_vertex = |w: u32| used_vertices[welded.origin[w as usize] as usize];
@@ -123,7 +126,7 @@ fn kept<T>(all: Vec<T>, stays: impl Iterator<Item = bool>) -> Vec<T> {
     all.into_iter().zip(stays).filter_map(|(x, stays)| stays.then_some(x)).collect()
 }
 
-/// Vertices that no edge joins to the rest within [`FAR`] median edges, ascending: slips of a modelling program. Where there are
+/// Vertices that no edge joins to the rest within [`FAR_EDGES`] median edges, ascending: slips of a modelling program. Where there are
 /// more than a few, the mesh is coarse instead.
 fn far_vertices(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<u32> {
     let mut shortest = vec![f64::INFINITY; positions.len()];
@@ -139,7 +142,7 @@ fn far_vertices(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<u32> {
     }
     lengths.sort_by(f64::total_cmp);
     let Some(median) = lengths.get(lengths.len() / 2) else { return Vec::new() };
-    let is_far = |v: &u32| (FAR * median..f64::INFINITY).contains(&shortest[*v as usize]);
+    let is_far = |v: &u32| (FAR_EDGES * median..f64::INFINITY).contains(&shortest[*v as usize]);
     let far: Vec<u32> = (0..positions.len() as u32).filter(is_far).collect();
     if far.len() > MOST_FAR { Vec::new() } else { far }
 }
@@ -204,16 +207,18 @@ fn keep_outer(sheet: &mut Sheet, file: &PolygonMesh) -> Result<(), FitError> {
 
 /// Keeps the connected piece with the largest area and lists the others.
 fn keep_largest(sheet: &mut Sheet, file: &PolygonMesh) {
-    let (pieces, piece_of_face) = sheet.pieces();
+    let Ok(mesh) = sheet.mesh() else { return };
+    let topology = Topology::new(&mesh);
+    let mut pieces = MeshPiece::all(&mesh, &topology);
     let Some(largest) = (0..pieces.len()).max_by(|a, b| pieces[*a].area.total_cmp(&pieces[*b].area)) else {
         return;
     };
-    let mut others: Vec<MeshPiece> =
-        pieces.into_iter().enumerate().filter(|(number, _)| *number != largest).map(|(_, p)| p).collect();
-    others.sort_by(|a, b| b.area.total_cmp(&a.area));
-    let dropped = sheet.drop_faces(|f| piece_of_face[f] == largest, file);
+    let piece = |f: usize| topology.component_of_vertex[mesh.faces()[f][0] as usize] as usize;
+    let dropped = sheet.drop_faces(|f| piece(f) == largest, file);
     sheet.note(RepairKind::DroppedPieces, Elements::Faces(dropped));
-    sheet.dropped_pieces = others;
+    pieces.remove(largest);
+    pieces.sort_by(|a, b| b.area.total_cmp(&a.area));
+    sheet.dropped_pieces = pieces;
 }
 
 /// Joins borders within `reach` (in the file's unit), without it those that coincide.
@@ -284,8 +289,7 @@ pub(super) fn turn_outward(
 impl Sheet {
     /// Faces with their front outside where they enclose something: behind them is the cloth.
     fn outward_faces(&self) -> Vec<[u32; 3]> {
-        let mesh = TriMesh::new(self.positions.clone(), self.faces.clone());
-        match mesh.is_ok_and(|mesh| is_inside_out(&mesh)) {
+        match self.mesh().is_ok_and(|mesh| is_inside_out(&mesh)) {
             true => self.faces.iter().map(|[a, b, c]| [*a, *c, *b]).collect(),
             false => self.faces.clone(),
         }

@@ -9,6 +9,7 @@ use super::placement::{Origin, Placement};
 use super::sitting::Sitting;
 use crate::asset::Category;
 use crate::mesh::MeshMeasures;
+use clothcombo_physics::{Topology, TriMesh};
 use seams::write_seams;
 use serde::Serialize;
 use std::fmt;
@@ -136,6 +137,22 @@ pub struct MeshPiece {
     pub boundary_loops: usize,
 }
 
+impl MeshPiece {
+    /// All connected pieces of a mesh, by their number in `topology`.
+    pub(super) fn all(mesh: &TriMesh, topology: &Topology) -> Vec<Self> {
+        let empty = Self { vertices: 0, triangles: 0, area: 0.0, boundary_loops: 0 };
+        let mut pieces = vec![empty; topology.component_count];
+        let piece = |v: u32| topology.component_of_vertex[v as usize] as usize;
+        topology.component_of_vertex.iter().for_each(|c| pieces[*c as usize].vertices += 1);
+        for (f, face) in mesh.faces().iter().enumerate() {
+            pieces[piece(face[0])].triangles += 1;
+            pieces[piece(face[0])].area += mesh.face_area(f);
+        }
+        topology.boundary_loops.iter().for_each(|l| pieces[piece(l[0])].boundary_loops += 1);
+        pieces
+    }
+}
+
 impl fmt::Display for MeshPiece {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { vertices, triangles, area, boundary_loops } = self;
@@ -174,6 +191,15 @@ pub fn contact_warnings(inside: usize, body_pairs: usize, self_pairs: usize) -> 
     let own = || format!("{self_pairs} self-intersecting triangle pairs");
     let of_body = (inside > 0 || body_pairs > 0).then(body);
     of_body.into_iter().chain((self_pairs > 0).then(own)).collect()
+}
+
+/// What speaks against a file of which this many connected pieces are worn on their own.
+pub fn outfit_warning(worn_pieces: usize) -> Option<String> {
+    (worn_pieces > 1).then(|| {
+        format!(
+            "{worn_pieces} of its pieces would be worn without the others: for an outfit, export one file per garment"
+        )
+    })
 }
 
 /// Everything that was assumed, repaired and measured.

@@ -11,31 +11,34 @@ use super::coverage::off_trunk;
 use super::error::FitError;
 use super::judge::{Candidate, Judge};
 use super::limb_pose::LimbPose;
-use super::placement::{Origin, Placement, Unit, UpAxis};
+use super::placement::{Origin, Placement, Unit};
 use super::settings::FitSettings;
 use super::sitting::Sitting;
 use crate::asset::Body;
 use crate::mesh::bounds;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::add;
-use limbs::{has_limbs_at_rest, with_legs_apart};
 use rayon::prelude::*;
 
 /// Arm angles tried first (degrees).
 pub(super) const ARM_ANGLES: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
 /// Heights tried first (m apart), and places in front of and behind the middle (m).
 const HEIGHT_STEP: f64 = 0.04;
-const FORWARD: [f64; 3] = [0.0, 0.05, -0.05];
+const FORWARD_STEPS: [f64; 3] = [0.0, 0.05, -0.05];
 /// Heights of rims tried first: how many, how far apart and from how far below the waist (m).
 const RIM_HEIGHTS: usize = 20;
 const RIM_STEP: f64 = 0.025;
 const BELOW_WAIST: f64 = 0.18;
+/// Largest extent of a garment, in those of the body: from a belt to a train.
+const PLAUSIBLE_EXTENT: [f64; 2] = [0.1, 1.2];
 /// Starts of one scale and turn that are kept by the blunt likelihood, from rims, and of them for the climb.
-const ROUGH: usize = 60;
+const ROUGH_STARTS: usize = 60;
 const FROM_RIMS: usize = 6;
 const CLIMBED: usize = 10;
 /// Candidates that are judged by everything.
 const JUDGED: usize = 12;
+/// Angle of each leg (degrees) for whose weights a body is made.
+const LEGS_APART: f64 = 6.0;
 /// How far up and down the height of a placement is doubted (m): a garment is back within 2 cm.
 const PROBE: f64 = 0.025;
 
@@ -47,7 +50,7 @@ pub(super) struct SearchBody {
     /// The field of the body with its legs apart; made here, since the body is shared by threads afterwards.
     apart: BodyField,
     /// Largest extent of the body (m).
-    reach: f64,
+    pub(super) reach: f64,
 }
 
 impl SearchBody {
@@ -62,7 +65,8 @@ impl SearchBody {
         let surface = Surface::new(body.template.clone(), body.faces.clone());
         let reach = body.zero_body().extent();
         let (field, skeleton) = (BodyField::new(body), Skeleton::new(body));
-        let apart = with_legs_apart(&field, body);
+        let placement = Placement { leg_angle_degrees: LEGS_APART, ..Placement::AS_GIVEN };
+        let apart = field.posed(&LimbPose::of(body, &placement), body);
         Ok(Self { field, skeleton, surface, apart, reach })
     }
 }
@@ -70,32 +74,27 @@ impl SearchBody {
 /// A search on one body.
 pub(super) struct Search<'a> {
     pub(super) body: &'a Body,
+    /// Of the same body.
     pub(super) measured: &'a SearchBody,
 }
 
 impl<'a> Search<'a> {
-    /// `measured`: of the same body.
-    pub fn new(body: &'a Body, measured: &'a SearchBody) -> Self {
-        Self { body, measured }
-    }
-
-    /// Largest extent of the body (m).
-    pub fn reach(&self) -> f64 {
-        self.measured.reach
-    }
-
-    /// Whether a garment of this largest extent (m) can fit this body at all.
-    pub fn is_plausible_extent(&self, extent: f64) -> bool {
-        extent >= 0.1 * self.measured.reach && extent <= 1.2 * self.measured.reach
+    /// Units in which a garment can fit this body at all, of those that `settings` allow.
+    pub fn plausible_units(&self, cloth: &Cloth, settings: &FitSettings) -> Vec<Unit> {
+        let (extent, [least, most]) =
+            (cloth.extent(), PLAUSIBLE_EXTENT.map(|share| share * self.measured.reach));
+        let units = settings.unit.map_or(Unit::ALL.to_vec(), |unit| vec![unit]);
+        let is_plausible = |unit: &Unit| (least..=most).contains(&(extent * unit.metres()));
+        units.into_iter().filter(is_plausible).collect()
     }
 
     /// How a garment sits in its own arm pose, and its height (m).
     pub fn measured(&self, cloth: &Cloth, placement: &Placement) -> (Sitting, f64) {
-        let points = placement.apply(&cloth.fine.0);
+        let points = placement.apply(&cloth.fine);
         let [low, high] = bounds(&points);
-        let sitting = match has_limbs_at_rest(placement) {
+        let sitting = match placement.has_limbs_at_rest() {
             true => Sitting::new(&points, self.body, &self.measured.surface),
-            false => Sitting::new(&points, self.body, &LimbPose::of(self.body, placement).surface),
+            false => Sitting::new(&points, self.body, &LimbPose::of(self.body, placement).surface(self.body)),
         };
         (sitting, high[1] - low[1])
     }
@@ -103,12 +102,12 @@ impl<'a> Search<'a> {
     /// Sample points with the arms raised to the T-pose (m).
     pub fn level(&self, cloth: &Cloth, placement: &Placement) -> Vec<[f64; 3]> {
         let turn = LimbTurn::of(placement);
-        placement.apply(&cloth.fine.0).into_iter().map(|p| self.measured.field.level(p, turn.arms)).collect()
+        placement.apply(&cloth.fine).into_iter().map(|p| self.measured.field.level(p, turn.arms)).collect()
     }
 
     /// Where a garment lies that covers neither trunk nor hips.
     pub fn off_trunk(&self, cloth: &Cloth, placement: &Placement) -> Option<&'static str> {
-        off_trunk(&placement.apply(&cloth.fine.0), self.body)
+        off_trunk(&placement.apply(&cloth.fine), self.body)
     }
 
     /// The surface of the zero body in T-pose.
@@ -121,32 +120,27 @@ impl<'a> Search<'a> {
         Judge { field: &self.measured.field, skeleton: &self.measured.skeleton, cloth, settings }
     }
 
-    /// Distinct candidates, the best first. `extent`: largest extent of the file in its unit.
-    pub fn candidates(&self, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Vec<Candidate> {
-        self.found(cloth, extent, settings, true)
+    /// Distinct candidates, the best first.
+    pub fn candidates(&self, cloth: &Cloth, settings: &FitSettings) -> Vec<Candidate> {
+        self.found(cloth, settings, true)
     }
 
     /// The same without bodies made for their limbs, to compare sizes by.
-    pub fn quick_candidates(&self, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Vec<Candidate> {
-        self.found(cloth, extent, settings, false)
+    pub fn quick_candidates(&self, cloth: &Cloth, settings: &FitSettings) -> Vec<Candidate> {
+        self.found(cloth, settings, false)
     }
 
-    fn found(&self, cloth: &Cloth, extent: f64, settings: &FitSettings, is_posed: bool) -> Vec<Candidate> {
+    fn found(&self, cloth: &Cloth, settings: &FitSettings, is_posed: bool) -> Vec<Candidate> {
         let judge = self.judge(cloth, settings);
         let leg_angle_degrees = settings.legs_degrees.unwrap_or(0.0);
         let straight = Placement { leg_angle_degrees, ..Placement::AS_GIVEN };
         let posed = self.posed_field(&straight);
         let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..judge };
-        let units = Unit::ALL.into_iter().filter(|u| {
-            settings.unit.is_none_or(|s| s == *u) && self.is_plausible_extent(extent * u.metres())
-        });
-        let ups: Vec<UpAxis> = settings.up.map_or(UpAxis::USUAL.to_vec(), |up| vec![up]);
-        let turns = settings.turn_degrees.map_or(vec![0.0, 90.0, 180.0, 270.0], |turn| vec![turn]);
         let mut bases = Vec::new();
-        for unit in units {
-            for &up in &ups {
-                let turned = turns.iter().map(|t| Placement { unit, up, turn_degrees: *t, ..straight });
-                bases.extend(turned);
+        for unit in self.plausible_units(cloth, settings) {
+            for up in settings.ups() {
+                let turns = settings.turns().into_iter();
+                bases.extend(turns.map(|turn_degrees| Placement { unit, up, turn_degrees, ..straight }));
             }
         }
         let mut found: Vec<Candidate> =
@@ -175,7 +169,7 @@ impl<'a> Search<'a> {
         starts.truncate(FROM_RIMS);
         let mut others = self.starts_by_height(base, judge);
         sort(&mut others);
-        others.truncate(ROUGH);
+        others.truncate(ROUGH_STARTS);
         starts.extend(others);
         let worn = starts.into_iter().map(|c| judge.with_openings(c)).filter(|c| c.is_worn).collect();
         let roughly = Steps { from: 0.04, to: 0.01, is_sharp: false, is_fine: false, moves: Moves::All };
@@ -197,7 +191,7 @@ impl<'a> Search<'a> {
         let places: Vec<[f64; 3]> = match judge.settings.offset {
             Some(offset) => vec![offset],
             None => (0..heights)
-                .flat_map(|h| FORWARD.map(|forward| (h, forward)))
+                .flat_map(|h| FORWARD_STEPS.map(|forward| (h, forward)))
                 .map(|(h, forward)| {
                     let top = self.measured.field.low[1] + 0.2 + h as f64 * HEIGHT_STEP;
                     [-x, top - high[1], self.measured.field.spine_z - z + forward]
@@ -214,7 +208,7 @@ impl<'a> Search<'a> {
                     origin: Origin::Elsewhere,
                     ..*base
                 };
-                judge.scored(p, &turned, false, None)
+                judge.scored(Candidate::at(p), &turned, false)
             };
             all.extend(places.iter().map(at));
         }
@@ -240,7 +234,7 @@ impl<'a> Search<'a> {
                     let translation =
                         [-centre[0], y - centre[1], self.measured.field.spine_z + forward - centre[2]];
                     let p = Placement { translation, origin: Origin::Elsewhere, ..*base };
-                    all.push(judge.scored(p, &turned, false, None));
+                    all.push(judge.scored(Candidate::at(p), &turned, false));
                 }
             }
         }

@@ -1,5 +1,6 @@
 //! Triangles of a file while they are repaired: every vertex, face and corner knows what of the file it was.
 
+use super::error::FitError;
 use super::report::{Elements, MeshPiece, Repair, RepairKind};
 use crate::format::{FileFace, PolygonMesh};
 use crate::mesh::{Attachment, Seam, attach};
@@ -40,6 +41,7 @@ impl SheetBorder {
 }
 
 /// Triangles in the file's coordinates.
+#[derive(Default)]
 pub(super) struct Sheet {
     pub positions: Vec<[f64; 3]>,
     pub faces: Vec<[u32; 3]>,
@@ -58,52 +60,26 @@ pub(super) struct Sheet {
     /// What [`Keep::Largest`](super::Keep::Largest) left out; areas in the square of the file's unit.
     pub dropped_pieces: Vec<MeshPiece>,
     /// Polygons of the file that are left out because of [`Keep`](super::Keep).
-    dropped_faces: Vec<u32>,
+    pub dropped_faces: Vec<u32>,
     /// For each vertex of the file a number that those at its place share; `u32::MAX` for unused ones.
-    welded: Vec<u32>,
+    pub welded: Vec<u32>,
 }
 
 impl Sheet {
-    /// A sheet whose vertices still have the numbers of `welded`.
-    pub fn new(
-        positions: Vec<[f64; 3]>,
-        faces: Vec<[u32; 3]>,
-        face_origin: Vec<u32>,
-        corners: Vec<[Corner; 3]>,
-        welded: Vec<u32>,
-    ) -> Self {
-        let turned = vec![false; faces.len()];
-        Self {
-            positions,
-            faces,
-            vertex_origin: Vec::new(),
-            vertex_of_file: Vec::new(),
-            face_origin,
-            corners,
-            turned,
-            repairs: Vec::new(),
-            seams: Vec::new(),
-            dropped_pieces: Vec::new(),
-            dropped_faces: Vec::new(),
-            welded,
-        }
+    /// Its triangles.
+    ///
+    /// # Errors
+    /// [`FitError::Mesh`] when there are none.
+    pub fn mesh(&self) -> Result<TriMesh, FitError> {
+        mesh_of(self.positions.clone(), self.faces.clone())
     }
 
     /// Adds a repair of some elements, if there are any.
-    pub fn note(&mut self, kind: RepairKind, elements: Elements) {
-        let elements = match elements {
-            Elements::Vertices(mut list) => {
-                list.sort_unstable();
-                list.dedup();
-                Elements::Vertices(list)
-            }
-            Elements::Faces(mut list) => {
-                list.sort_unstable();
-                list.dedup();
-                Elements::Faces(list)
-            }
-            Elements::Edges(list) => Elements::Edges(list),
-        };
+    pub fn note(&mut self, kind: RepairKind, mut elements: Elements) {
+        if let Elements::Vertices(list) | Elements::Faces(list) = &mut elements {
+            list.sort_unstable();
+            list.dedup();
+        }
         if !elements.is_empty() {
             self.repairs.push(Repair { kind, count: elements.len(), elements });
         }
@@ -226,27 +202,6 @@ impl Sheet {
         0.5 * norm(cross(sub(b, a), sub(c, a)))
     }
 
-    /// Connected pieces, and the piece of each face.
-    pub fn pieces(&self) -> (Vec<MeshPiece>, Vec<usize>) {
-        let Ok(mesh) = TriMesh::new(self.positions.clone(), self.faces.clone()) else {
-            return (Vec::new(), Vec::new());
-        };
-        let topology = Topology::new(&mesh);
-        let piece_of_face: Vec<usize> =
-            self.faces.iter().map(|f| topology.component_of_vertex[f[0] as usize] as usize).collect();
-        let empty = MeshPiece { vertices: 0, triangles: 0, area: 0.0, boundary_loops: 0 };
-        let mut pieces = vec![empty; topology.component_count];
-        topology.component_of_vertex.iter().for_each(|c| pieces[*c as usize].vertices += 1);
-        for (f, piece) in piece_of_face.iter().enumerate() {
-            pieces[*piece].triangles += 1;
-            pieces[*piece].area += self.area(f);
-        }
-        for border in &topology.boundary_loops {
-            pieces[topology.component_of_vertex[border[0] as usize] as usize].boundary_loops += 1;
-        }
-        (pieces, piece_of_face)
-    }
-
     /// For each vertex of the file the place that it follows: the vertex it became; where its faces were left out on request, the
     /// nearest point of the sheet and how it stands on it (m, `metres` of the file's unit); otherwise the nearest vertex.
     pub fn followed(&self, file: &PolygonMesh, metres: f64) -> Vec<Attachment> {
@@ -315,6 +270,14 @@ impl Sheet {
         let step = if turned { count - 1 } else { 1 };
         (0..count).map(|i| (start + i * step) % count).map(|k| Some([vertices[k as usize]?, k])).collect()
     }
+}
+
+/// A triangle mesh.
+///
+/// # Errors
+/// [`FitError::Mesh`] when there is none.
+pub(super) fn mesh_of(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Result<TriMesh, FitError> {
+    TriMesh::new(positions, faces).map_err(|e| FitError::Mesh(e.to_string()))
 }
 
 #[cfg(test)]

@@ -6,16 +6,15 @@
 //! | source body | carried by |
 //! |---|---|
 //! | npz of the target's model | inverse of the shape transfer ([`same_model`]) |
-//! | npz of another model | a similarity per bone, then the distance to the skin ([`other_model`]) |
+//! | npz of another model | a similarity per bone ([`bones`]), then the distance to the skin ([`gaps`]) |
 //! | mesh of the target's vertices | recovered pose and shape, then as the first ([`same_model`]) |
-//! | any mesh of a person | registration with the target's model, the distance to the skin, then as the first ([`registered`]) |
+//! | any mesh of a person | registration with the target's model ([`registration`]), the distance to the skin, then as the first |
 
+mod binding;
 mod bones;
+mod closest_shape;
 mod gaps;
 mod icp;
-mod model;
-mod other_model;
-mod registered;
 mod registration;
 mod same_model;
 mod source;
@@ -23,21 +22,26 @@ mod stance;
 #[cfg(test)]
 mod tests;
 
+pub(super) use binding::SourceCloth;
+pub(super) use same_model::{POSE_ROUNDS, SameModel};
 pub use source::SourceBody;
 
 use super::error::FitError;
 use super::placement::{Origin, Placement, Unit, UpAxis};
 use super::settings::FitSettings;
-use crate::asset::{Binding, BindingSettings, Body, BodyParts, Category, Garment};
-use clothcombo_physics::query::Distance;
+use crate::asset::body::skin;
+use crate::asset::{Body, Category};
+use crate::mesh::gaps_to;
+use bones::similarities;
+use clothcombo_physics::Surface;
 use clothcombo_physics::vec3::{norm, scale, sub};
-use clothcombo_physics::{Surface, TriMesh};
-use other_model::OtherModel;
-use rayon::prelude::*;
-use registered::Registered;
-use same_model::SameModel;
+use gaps::{apart_mm, median, restore};
+use icp::Similarity;
+use registration::{RegisteredMesh, register};
+use same_model::{RecoveredMesh, SHAPE_ROUNDS, has_topology, recovered};
 use serde::Serialize;
 use source::SourceKind;
+use std::sync::Arc;
 
 /// What was done with a garment that was made on another body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -104,13 +108,22 @@ pub(super) struct Aligned {
     pub placement: Placement,
     name: String,
     shape: Vec<f64>,
-    carrier: Carrier,
+    /// The surface on which the garment was made (m).
+    positions: Vec<[f64; 3]>,
+    faces: Arc<[[u32; 3]]>,
+    to_model: ToModel,
+    /// The target's model, on which the garment lies then.
+    model: SameModel,
+    alignment_mm: Option<f64>,
 }
 
-enum Carrier {
-    Same(SameModel),
-    Other(OtherModel),
-    Registered(Registered),
+/// How cloth on the source body comes to the target's model.
+enum ToModel {
+    /// It is there.
+    Identity,
+    /// By the bones of another model's body.
+    Bones(Box<Body>, Vec<[[f64; 4]; 3]>),
+    Registration(Similarity),
 }
 
 impl SourceBody {
@@ -132,39 +145,80 @@ impl SourceBody {
         }
         let name = self.name.clone();
         match &self.kind {
-            SourceKind::Model(model) => {
+            SourceKind::Model(source) => {
                 let placement = Placement {
                     unit: settings.unit.unwrap_or(Unit::M),
                     up: settings.up.unwrap_or(UpAxis::Y),
                     turn_degrees: settings.turn_degrees.unwrap_or(0.0),
                     origin: Origin::SourceBody,
-                    translation: settings.offset.unwrap_or(scale(model.pelvis, -1.0)),
+                    translation: settings.offset.unwrap_or(scale(source.pelvis, -1.0)),
                     ..Placement::AS_GIVEN
                 };
-                let carrier = match same_model::has_topology(body, &model.faces) {
-                    true => Carrier::Same(SameModel::shaped(model.positions.clone())),
-                    false => Carrier::Other(OtherModel::new(model, body).map_err(wrong)?),
-                };
-                Ok(Aligned { placement, name, shape: model.shape.clone(), carrier })
+                let own = &source.body;
+                let (shape, positions, faces) =
+                    (source.shape.clone(), own.template.clone(), own.faces.clone());
+                if has_topology(body, &faces) {
+                    let (to_model, model) = (ToModel::Identity, SameModel::shaped(positions.clone()));
+                    return Ok(Aligned {
+                        placement,
+                        name,
+                        shape,
+                        positions,
+                        faces,
+                        to_model,
+                        model,
+                        alignment_mm: None,
+                    });
+                }
+                let bones = similarities(own, body).map_err(wrong)?;
+                let model = SameModel::shaped(body.template.clone());
+                let alignment_mm =
+                    Some(apart_mm(&skinned(own, &bones), &Surface::from_mesh(&body.zero_body())));
+                let to_model = ToModel::Bones(Box::new(own.clone()), bones);
+                Ok(Aligned { placement, name, shape, positions, faces, to_model, model, alignment_mm })
             }
             SourceKind::Mesh(mesh) => {
                 // Vertices in another order, or of another model by chance, are a mesh like any other.
-                if let Some((placement, shape, same)) = same_model::recovered(mesh, body, settings) {
-                    return Ok(Aligned { placement, name, shape, carrier: Carrier::Same(same) });
+                if let Some(found) = recovered(mesh, body, settings) {
+                    let RecoveredMesh { placement, shape, model, residual_mm } = found;
+                    let (positions, faces) = (model.positions().to_vec(), body.faces.clone());
+                    let (to_model, alignment_mm) = (ToModel::Identity, Some(residual_mm));
+                    return Ok(Aligned {
+                        placement,
+                        name,
+                        shape,
+                        positions,
+                        faces,
+                        to_model,
+                        model,
+                        alignment_mm,
+                    });
                 }
-                let (placement, registered) = registration::register(mesh, body, settings).map_err(wrong)?;
-                let shape = registered.shape.clone();
-                Ok(Aligned { placement, name, shape, carrier: Carrier::Registered(registered) })
+                let found = register(&mesh.surface, body, settings).map_err(wrong)?;
+                let RegisteredMesh { placement, motion, model, alignment_mm } = found;
+                Ok(Aligned {
+                    placement,
+                    name,
+                    shape: model.shape.clone(),
+                    positions: placement.apply(mesh.surface.positions()),
+                    faces: mesh.surface.faces().into(),
+                    to_model: ToModel::Registration(motion),
+                    model: SameModel::posed(body, model).map_err(wrong)?,
+                    alignment_mm: Some(alignment_mm),
+                })
             }
         }
     }
 }
 
-/// Cloth on the source body, in its coordinates (m).
-pub(super) struct Cloth<'a> {
-    pub positions: &'a [[f64; 3]],
-    pub faces: &'a [[u32; 3]],
-    pub category: Option<Category>,
+/// The vertices of a body, carried by its bones.
+fn skinned(body: &Body, bones: &[[[f64; 4]; 3]]) -> Vec<[f64; 3]> {
+    let carried = |v: usize| {
+        let (joints, weights) = body.skin_weights.row(v);
+        let bones = joints.iter().zip(weights).map(|(j, w)| (&bones[usize::from(*j)], f64::from(*w)));
+        skin(body.template[v], bones)
+    };
+    (0..body.vertex_count()).map(carried).collect()
 }
 
 impl Aligned {
@@ -197,42 +251,47 @@ impl Aligned {
         category: Option<Category>,
         body: &Body,
     ) -> Result<(Vec<[f64; 3]>, SourcePlacement), FitError> {
-        let source = match &self.carrier {
-            Carrier::Same(same) => same.surface(body),
-            Carrier::Other(other) => other.surface(),
-            Carrier::Registered(registered) => registered.surface(),
-        };
-        let source = Surface::new(source.0, source.1);
+        let source = Surface::new(self.positions.clone(), self.faces.clone());
         let placed = self.placement.apply(positions);
         let lies = Lies::new(&placed, &source);
         if let Some(where_it_is) = lies.implausible() {
             return Err(self.not_on_it(&where_it_is));
         }
-        let cloth = Cloth { positions: &placed, faces, category };
-        let (carried, base, how, alignment_mm, scale) = match &self.carrier {
-            Carrier::Same(same) => {
-                let how = if same.is_posed() { Carried::PoseAndShape } else { Carried::Shape };
-                (
-                    same.carry(&cloth, body).map_err(FitError::Mesh)?,
-                    placed.clone(),
-                    how,
-                    same.residual_mm,
-                    1.0,
-                )
+        let rest = |positions: &[[f64; 3]]| {
+            let cloth = SourceCloth { positions, faces, category };
+            self.model.carry(&cloth, body, SHAPE_ROUNDS).map_err(FitError::Mesh)
+        };
+        let restored = |mut positions: Vec<[f64; 3]>, factor: f64| {
+            let gaps: Vec<f64> = gaps_to(&placed, &source).into_iter().map(|gap| factor * gap).collect();
+            let target = Surface::new(self.model.positions().to_vec(), body.faces.clone());
+            restore(&mut positions, faces, &gaps, &target);
+            rest(&positions)
+        };
+        let (mut how, mut base, mut scale) = (Carried::Shape, placed.clone(), 1.0);
+        let carried = match &self.to_model {
+            ToModel::Identity => {
+                if self.model.is_posed() {
+                    how = Carried::PoseAndShape;
+                }
+                rest(&placed)?
             }
-            Carrier::Other(other) => {
-                let (carried, alignment) = other.carry(&cloth, &source, body).map_err(FitError::Mesh)?;
-                (carried, placed.clone(), Carried::Bones, Some(alignment), 1.0)
+            ToModel::Bones(own, bones) => {
+                how = Carried::Bones;
+                let cloth = SourceCloth { positions: &placed, faces, category };
+                let binding = cloth.bound(placed.clone(), own, body).map_err(FitError::Mesh)?;
+                restored(binding.skinned(&placed, bones), 1.0)?
             }
-            Carrier::Registered(registered) => {
-                let carried = registered.carry(&cloth, &source, body).map_err(FitError::Mesh)?;
-                let (alignment, scale) = (registered.alignment_mm, registered.motion.scale);
-                (carried.positions, carried.unrestored, Carried::Registration, Some(alignment), scale)
+            ToModel::Registration(motion) => {
+                (how, scale) = (Carried::Registration, motion.scale);
+                let moved: Vec<[f64; 3]> = placed.iter().map(|p| motion.apply(*p)).collect();
+                base = rest(&moved)?;
+                restored(moved, scale)?
             }
         };
         let mut moves: Vec<f64> = carried.iter().zip(&base).map(|(a, b)| norm(sub(*a, *b))).collect();
         let moved_mm = 1e3 * median(&mut moves);
         let (body, shape) = (self.name.clone(), self.shape.clone());
+        let alignment_mm = self.alignment_mm;
         let pelvis = (how != Carried::Registration).then(|| self.placement.translation.map(|x| 0.0 - x));
         Ok((carried, SourcePlacement { body, shape, carried: how, alignment_mm, pelvis, scale, moved_mm }))
     }
@@ -240,16 +299,16 @@ impl Aligned {
 
 /// How a garment lies on its source body.
 struct Lies {
-    /// Share of the vertices deeper inside than [`DEEP`].
+    /// Share of the vertices deeper inside than [`DEEP_INSIDE`].
     deep: f64,
-    /// Share of the vertices closer to the skin than [`CLOSE`].
+    /// Share of the vertices closer to the skin than [`CLOSE_TO_SKIN`].
     close: f64,
 }
 
 /// Cloth this far inside the body (m) is no tight fit any more.
-const DEEP: f64 = 0.025;
+const DEEP_INSIDE: f64 = 0.025;
 /// Cloth this close to the skin (m) rests on it.
-const CLOSE: f64 = 0.05;
+const CLOSE_TO_SKIN: f64 = 0.05;
 
 /// A garment of which a larger share is deep inside was made on another body, or is in other coordinates.
 const MOST_DEEP: f64 = 0.1;
@@ -262,61 +321,16 @@ impl Lies {
         let share = |is: &dyn Fn(&f64) -> bool| {
             gaps.iter().filter(|g| is(g)).count() as f64 / gaps.len().max(1) as f64
         };
-        Self { deep: share(&|g| *g < -DEEP), close: share(&|g| g.abs() < CLOSE) }
+        Self { deep: share(&|g| *g < -DEEP_INSIDE), close: share(&|g| g.abs() < CLOSE_TO_SKIN) }
     }
 
     fn implausible(&self) -> Option<String> {
         if self.deep > MOST_DEEP {
-            let (share, depth) = (100.0 * self.deep, 1e3 * DEEP);
+            let (share, depth) = (100.0 * self.deep, 1e3 * DEEP_INSIDE);
             return Some(format!("{share:.0} % of the garment is more than {depth:.0} mm inside it"));
         }
-        let (share, reach) = (100.0 * self.close, 1e3 * CLOSE);
+        let (share, reach) = (100.0 * self.close, 1e3 * CLOSE_TO_SKIN);
         (self.close < LEAST_CLOSE)
             .then(|| format!("only {share:.0} % of the garment is within {reach:.0} mm of its skin"))
     }
-}
-
-/// Signed distance of every point to the surface (m), positive outside.
-fn gaps_to(positions: &[[f64; 3]], surface: &Surface<f64>) -> Vec<f64> {
-    // Built before it is shared.
-    surface.closest_point();
-    positions.par_iter().with_min_len(64).map(|p| surface.gap(*p, Distance::ClosestPoint).gap).collect()
-}
-
-/// The middle one of some numbers; 0 of none.
-fn median(numbers: &mut [f64]) -> f64 {
-    numbers.sort_by(f64::total_cmp);
-    numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// `body` with these vertices, joints and one shape component, whose bindings cost no more than that. Without a
-/// direction it has none.
-fn one_shape_body(
-    body: &Body,
-    template: Vec<[f64; 3]>,
-    joints: Vec<[f64; 3]>,
-    direction: Option<Vec<f32>>,
-) -> Result<Body, String> {
-    let (shape_count, shape_directions) = direction.map_or((0, Vec::new()), |d| (1, d));
-    Body::new(BodyParts {
-        name: body.name.clone(),
-        faces: body.faces.clone(),
-        template,
-        shape_directions,
-        shape_count,
-        joint_shape_directions: vec![0.0; 3 * shape_count * joints.len()],
-        joint_template: joints,
-        pose_directions: None,
-        skin_weights: body.skin_weights.clone(),
-        parents: body.parents.clone(),
-        joint_names: body.joint_names.clone(),
-    })
-    .map_err(|e| e.to_string())
-}
-
-/// Binds cloth at `positions` to `on`; `target` guesses the category where none is known.
-fn bound(cloth: &Cloth, positions: Vec<[f64; 3]>, on: &Body, target: &Body) -> Result<Binding, String> {
-    let mesh = TriMesh::new(positions, cloth.faces.to_vec()).map_err(|e| e.to_string())?;
-    let category = cloth.category.unwrap_or_else(|| Category::guess(&mesh, target));
-    Ok(Binding::new(&Garment::new(category, mesh), on, &BindingSettings::default()))
 }
