@@ -6,7 +6,7 @@ use crate::call::{call, refused_text};
 use crate::drape::Drape;
 use clothcombo_data::asset::{KnownShape, Motion, Pose, Provenance};
 use clothcombo_data::fit::FitSettings;
-use clothcombo_data::fit::hints::GarmentEntry;
+use clothcombo_data::fit::hints::GarmentHints;
 use clothcombo_data::format::PolygonMesh;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::mesh::MeshError;
@@ -64,7 +64,7 @@ pub type GarmentInput<'py> =
 pub struct WantedGarment {
     pub name: String,
     pub mesh: Option<Result<PolygonMesh, MeshError>>,
-    pub entry: GarmentEntry,
+    pub entry: GarmentHints,
 }
 
 impl WantedGarment {

@@ -33,7 +33,7 @@ pub(super) enum Opening {
 }
 
 /// The bones of the zero body, from the pelvis to the five ends.
-pub(super) struct Skeleton {
+pub(super) struct BodySkeleton {
     limbs: [Vec<[f64; 3]>; 5],
     /// Of left and right arm, left and right leg the joint that turns it.
     roots: [Option<[f64; 3]>; 4],
@@ -55,7 +55,7 @@ impl PiercingBones {
     }
 }
 
-impl Skeleton {
+impl BodySkeleton {
     pub fn new(body: &Body) -> Self {
         Self {
             limbs: LIMB_CHAINS.map(|names| names.iter().filter_map(|n| body.joint_place(n)).collect()),

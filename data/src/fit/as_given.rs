@@ -1,9 +1,9 @@
 //! Files as they stand: their origin lies at one of the usual points, or where it is said to be, and nothing is searched for.
 
-use super::climb::{Moves, Steps, climbed};
+use super::climb::{ClimbSteps, Moves, climbed};
 use super::cloth::Cloth;
 use super::judge::{Candidate, Judge, UNWORN};
-use super::placement::{Origin, Placement};
+use super::placement::{FileOrigin, Placement};
 use super::search::{ARM_ANGLES, Search};
 use super::settings::FitSettings;
 use crate::mesh::{outward_area, triangle_normal};
@@ -25,8 +25,8 @@ impl Search<'_> {
     pub fn usual(&self, bases: &[Placement], judge: &Judge) -> Vec<Placement> {
         let floor = self.measured.field.low[1];
         let places = match judge.settings.offset {
-            Some(offset) => vec![(Origin::Elsewhere, offset)],
-            None => vec![(Origin::Pelvis, [0.0; 3]), (Origin::Floor, [0.0, floor, 0.0])],
+            Some(offset) => vec![(FileOrigin::Elsewhere, offset)],
+            None => vec![(FileOrigin::Pelvis, [0.0; 3]), (FileOrigin::Floor, [0.0, floor, 0.0])],
         };
         let lowered = judge.settings.arms_lowered;
         let at = |base: &Placement| -> Vec<Placement> {
@@ -51,7 +51,7 @@ impl Search<'_> {
         };
         let angles = ARM_ANGLES.iter().filter(|degrees| **degrees != 0.0).map(scored);
         let best = angles.max_by(|a, b| a.score.total_cmp(&b.score))?;
-        let steps = Steps { from: 0.06, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::Limbs };
+        let steps = ClimbSteps { from: 0.06, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::Limbs };
         let climbed = judge.with_openings(climbed(judge, &best, &steps));
         (climbed.is_worn || judge.settings.arms_lowered == Some(true)).then_some(climbed.placement)
     }

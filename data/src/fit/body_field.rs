@@ -3,9 +3,8 @@
 use super::limb_pose::{LIMB_ROOTS, LimbPose};
 use super::placement::Placement;
 use crate::asset::Body;
-use crate::generate::garment::Tube;
 use crate::generate::garment::measures::BodyMeasures;
-use crate::mesh::DistanceGrid;
+use crate::mesh::{DistanceGrid, compact};
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use std::sync::Arc;
@@ -100,30 +99,24 @@ impl Turn {
 
 impl BodyField {
     pub fn new(body: &Body) -> Self {
-        let side_of_joint = sides(body, LIMB_ROOTS[0]);
-        let side = |face: &[u32; 3]| {
-            let mut share = [0.0; 2];
-            for v in face {
-                let (joints, weights) = body.skin_weights.row(*v as usize);
-                for (joint, weight) in joints.iter().zip(weights) {
-                    if let Some(side) = side_of_joint[usize::from(*joint)] {
-                        share[side] += f64::from(*weight) / 3.0;
-                    }
-                }
-            }
-            (0..2).find(|s| share[*s] > 0.5)
-        };
+        let weights = limb_weights(body, LIMB_ROOTS[0]);
         let mut parts: [Vec<[u32; 3]>; 3] = Default::default();
-        body.faces.iter().for_each(|f| parts[side(f).unwrap_or(2)].push(*f));
+        for (face, weight) in body.faces.iter().zip(weights) {
+            let side = [weight, -weight].into_iter().position(|share| share > 0.5);
+            parts[side.unwrap_or(2)].push(*face);
+        }
         let [left, right, trunk] = &parts;
         let distance = |faces: &[[u32; 3]]| {
             let (positions, faces, radius) = closed(&body.template, faces);
             (DistanceGrid::new(&positions, &faces, FIELD_STEP, FIELD_BAND), radius)
         };
-        let (trunk, (left, right)) = rayon::join(
-            || distance(trunk).0,
-            || rayon::join(|| arm(body, left, 0, &distance), || arm(body, right, 1, &distance)),
-        );
+        let arm = |side: usize, faces: &[[u32; 3]]| {
+            let shoulder = body.joint_place(LIMB_ROOTS[0][side]).filter(|_| !faces.is_empty())?;
+            let (distance, radius) = distance(faces);
+            Some(Arm { side: [1.0, -1.0][side], shoulder, radius: 0.9 * radius, distance })
+        };
+        let (trunk, (left, right)) =
+            rayon::join(|| distance(trunk).0, || rayon::join(|| arm(0, left), || arm(1, right)));
         let (low, high) = body.zero_body().bounds();
         let measures = BodyMeasures::new(body).ok();
         let height = |name: &str, share: f64| {
@@ -141,8 +134,13 @@ impl BodyField {
                 armpit: height("left_shoulder", 0.82) - 0.07,
             },
         };
-        let column = measures.map(|m| m.column);
-        let form = taut(trunk.clone(), column.as_ref(), &levels);
+        // Taut cloth spans it where its outlines are hollow: from the hips to below the armpits, where no column runs into the
+        // shoulders.
+        let mut form = trunk.clone();
+        if let Some(column) = measures.map(|m| m.column) {
+            let (bottom, top) = (levels.hip, levels.armpit - 0.02);
+            form.unite(|p| if p[1] > bottom && p[1] < top { column.value(p) } else { f64::MAX });
+        }
         let spine = ["pelvis", "spine1", "spine2", "spine3"].map(|name| body.joint_place(name));
         let spine: Vec<f64> = spine.into_iter().flatten().map(|p| p[2]).collect();
         let spine_z = spine.iter().sum::<f64>() / spine.len().max(1) as f64;
@@ -158,7 +156,17 @@ impl BodyField {
     pub fn posed(&self, posed: &LimbPose, body: &Body) -> Self {
         let weights = std::array::from_fn(|limb| {
             let is_turned = posed.angles[limb] != 0.0;
-            is_turned.then(|| Arc::new(limb_weights(body, &posed.positions, LIMB_ROOTS[limb])))
+            is_turned.then(|| {
+                let weights = limb_weights(body, LIMB_ROOTS[limb]);
+                let grid = DistanceGrid::with_attribute(
+                    &posed.positions,
+                    &body.faces,
+                    FIELD_STEP,
+                    FIELD_BAND,
+                    |face| weights[face],
+                );
+                Arc::new(grid.1)
+            })
         });
         Self { weights, ..self.clone() }
     }
@@ -231,41 +239,17 @@ fn turned_back(p: [f64; 3], weight: f64, turn: Turn, joint: [f64; 3]) -> [f64; 3
     back
 }
 
-/// The signed weight that the body's surface next to each point has of the left (positive) and right (negative) of two limbs.
-fn limb_weights(body: &Body, posed: &[[f64; 3]], from: [&str; 2]) -> DistanceGrid {
+/// The signed weight that each face of a body has of the left (positive) and right (negative) of two limbs.
+fn limb_weights(body: &Body, from: [&str; 2]) -> Vec<f64> {
     let sides = sides(body, from);
-    let weight = |face: usize| {
-        let of_vertex = |v: &u32| {
-            let (joints, weights) = body.skin_weights.row(*v as usize);
-            let signed = joints.iter().zip(weights).filter_map(|(joint, weight)| {
-                sides[usize::from(*joint)].map(|side| [1.0, -1.0][side] * f64::from(*weight))
-            });
-            signed.sum::<f64>()
-        };
-        body.faces[face].iter().map(of_vertex).sum::<f64>() / 3.0
+    let of_vertex = |v: &u32| {
+        let (joints, weights) = body.skin_weights.row(*v as usize);
+        let signed = joints.iter().zip(weights).filter_map(|(joint, weight)| {
+            sides[usize::from(*joint)].map(|side| [1.0, -1.0][side] * f64::from(*weight))
+        });
+        signed.sum::<f64>()
     };
-    DistanceGrid::with_attribute(posed, &body.faces, FIELD_STEP, FIELD_BAND, weight).1
-}
-
-/// A trunk whose outlines are convex between hips and armpits, as taut cloth spans it.
-fn taut(mut trunk: DistanceGrid, column: Option<&Tube>, levels: &Levels) -> DistanceGrid {
-    // Below the armpits, where no column runs into the shoulders.
-    let (bottom, top) = (levels.hip, levels.armpit - 0.02);
-    if let Some(column) = column {
-        trunk.unite(|p| if p[1] > bottom && p[1] < top { column.value(p) } else { f64::MAX });
-    }
-    trunk
-}
-
-fn arm(
-    body: &Body,
-    faces: &[[u32; 3]],
-    side: usize,
-    distance: &dyn Fn(&[[u32; 3]]) -> (DistanceGrid, f64),
-) -> Option<Arm> {
-    let shoulder = body.joint_place(LIMB_ROOTS[0][side]).filter(|_| !faces.is_empty())?;
-    let (distance, radius) = distance(faces);
-    Some(Arm { side: [1.0, -1.0][side], shoulder, radius: 0.9 * radius, distance })
+    body.faces.iter().map(|face| face.iter().map(of_vertex).sum::<f64>() / 3.0).collect()
 }
 
 /// For every joint whether it belongs to the left (0) or right (1) of two limbs, from these joints on.
@@ -281,20 +265,8 @@ fn sides(body: &Body, from: [&str; 2]) -> Vec<Option<usize>> {
 
 /// Faces with every border closed by a fan around its centroid, and the mean radius of the longest border (m).
 fn closed(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>, f64) {
-    let mut number = vec![u32::MAX; positions.len()];
-    let mut used = Vec::new();
-    let mut all: Vec<[u32; 3]> = faces
-        .iter()
-        .map(|f| {
-            f.map(|v| {
-                if number[v as usize] == u32::MAX {
-                    number[v as usize] = used.len() as u32;
-                    used.push(positions[v as usize]);
-                }
-                number[v as usize]
-            })
-        })
-        .collect();
+    let (used, mut all) = compact(faces.iter().copied(), positions.len());
+    let mut used: Vec<[f64; 3]> = used.iter().map(|v| positions[*v as usize]).collect();
     let (mut longest, mut radius) = (0, 0.0);
     let Ok(mesh) = TriMesh::new(used.clone(), all.clone()) else { return (used, all, radius) };
     for border in Topology::new(&mesh).boundary_loops {

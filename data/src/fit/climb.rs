@@ -9,7 +9,7 @@ const LOWERED_ARMS: [f64; 2] = [3.0, 85.0];
 const LEGS_APART_RANGE: [f64; 2] = [0.5, 25.0];
 
 /// How steps shrink (m), and what counts on the way.
-pub(super) struct Steps {
+pub(super) struct ClimbSteps {
     pub from: f64,
     pub to: f64,
     pub is_sharp: bool,
@@ -28,7 +28,7 @@ pub(super) enum Moves {
 }
 
 /// Slid along the three axes, and arms and legs turned, as long as that helps; what settings fix stays.
-pub(super) fn climbed(judge: &Judge, start: &Candidate, steps: &Steps) -> Candidate {
+pub(super) fn climbed(judge: &Judge, start: &Candidate, steps: &ClimbSteps) -> Candidate {
     let turned = judge.turned(&start.placement, start.rim, steps.is_fine);
     let mut best = judge.scored(*start, &turned, steps.is_sharp);
     let slides = judge.settings.offset.is_none() && steps.moves != Moves::Limbs;

@@ -4,7 +4,7 @@ use super::cloth::Cloth;
 use super::error::{FitError, Size};
 use super::judge::Candidate;
 use super::pieces::stray_pieces;
-use super::placement::{Origin, Unit, UpAxis};
+use super::placement::{FileOrigin, Unit, UpAxis};
 use super::readings::believed;
 use super::search::Search;
 use super::settings::FitSettings;
@@ -90,7 +90,7 @@ fn other_size(search: &Search, cloth: &Cloth, known: &FitSettings) -> Option<(Si
         let positions: Vec<[f64; 3]> = cloth.positions.iter().map(|p| scale(*p, factor)).collect();
         let scaled = Cloth::new(&positions, cloth.faces, cloth.topology);
         let best = believed(&search.quick_candidates(&scaled, known), search, &scaled)?;
-        let is_told = !best.is_tube || best.placement.origin != Origin::Elsewhere;
+        let is_told = !best.is_tube || best.placement.origin != FileOrigin::Elsewhere;
         is_told.then_some((Size { extent: extent * unit.metres(), unit, factor }, best.score))
     };
     let better = |a: &(Size, f64), b: &(Size, f64)| a.1.total_cmp(&b.1);

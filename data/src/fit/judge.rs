@@ -4,7 +4,7 @@
 //! ([`likelihood`](super::likelihood)), how usual such a file is ([`FitSettings::log_prior`]), how its upper rim lies,
 //! and whether limbs pass through openings instead of cloth ([`anatomy`](super::anatomy)).
 
-use super::anatomy::{PiercingBones, Skeleton};
+use super::anatomy::{BodySkeleton, PiercingBones};
 use super::body_field::{BodyField, LimbTurn};
 use super::cloth::Cloth;
 use super::likelihood::{log_likelihood, rough_log_likelihood};
@@ -72,7 +72,7 @@ impl Candidate {
 #[derive(Clone, Copy)]
 pub(super) struct Judge<'a> {
     pub field: &'a BodyField,
-    pub skeleton: &'a Skeleton,
+    pub skeleton: &'a BodySkeleton,
     pub cloth: &'a Cloth<'a>,
     pub settings: &'a FitSettings,
 }

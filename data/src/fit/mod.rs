@@ -34,7 +34,7 @@ pub use error::{FitError, Size};
 pub use from_body::{Carried, SourceBody, SourcePlacement};
 pub use pieces::{StrayPiece, stray_pieces};
 pub use placed::{PlacementCheck, is_on_body};
-pub use placement::{Origin, Placement, Unit, UpAxis};
+pub use placement::{FileOrigin, Placement, Unit, UpAxis};
 pub(crate) use repair::is_double;
 pub use repair::needs_repair;
 pub use report::{
@@ -60,7 +60,7 @@ use repair::{finish_seams, gaps, repair, turn_outward};
 use search::{Search, SearchBody};
 use settings::{LEAST_PIECE, MOST_STRETCH, MOST_STRETCHED};
 use sheet::mesh_of;
-use verdict::{ARMS_MISS, Verdict, verdict};
+use verdict::{ARMS_MISS, PlacementVerdict, verdict};
 
 /// Least distance between a fitted vertex and the body (m): the ε of the paper's body collision loss.
 const FIT_CLEARANCE: f64 = 0.002;
@@ -133,7 +133,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let (placement, mut doubts) = match &source {
         Some(source) => (source.placement, Vec::new()),
         None => {
-            let Verdict { placement, doubts, .. } = place(&search, &cloth, settings)?;
+            let PlacementVerdict { placement, doubts, .. } = place(&search, &cloth, settings)?;
             (placement, doubts)
         }
     };
@@ -255,7 +255,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
 }
 
 /// Where the garment belongs: legs that stand apart are looked for, and open seams taken as sewn, only if it is worn nowhere else.
-fn place(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Result<Verdict, FitError> {
+fn place(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Result<PlacementVerdict, FitError> {
     let of = |cloth: &Cloth| verdict(&search.candidates(cloth, settings), search, cloth, settings);
     let as_given = of(cloth);
     let is_worn = match &as_given {

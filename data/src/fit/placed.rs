@@ -57,28 +57,22 @@ impl PlacementCheck {
     /// and fits nowhere clearly better, by the same judgement by which [`fit`](super::fit) takes a placement; and every
     /// piece of it has its faces outwards. `body` is the one that was measured.
     pub fn is_on_body(&self, mesh: &TriMesh, body: &Body) -> bool {
-        if mesh.face_count() < MIN_TRIANGLES {
-            return false;
-        }
-        let search = Search { body, measured: &self.0 };
-        let topology = Topology::new(mesh);
-        let outward = outward_area(mesh.positions(), mesh.faces(), &topology, search.surface());
-        if outward.into_iter().any(|area| area < 0.0) {
-            return false;
-        }
         let settings = FitSettings {
             unit: Some(Unit::M),
             up: Some(UpAxis::Y),
             arms_lowered: Some(false),
             ..FitSettings::default()
         };
-        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
-        if stray(&search, &cloth, &search.judge(&cloth, &settings)).is_some() {
-            return false;
-        }
-        let Ok(given) = search.believed_as_given(&cloth, &settings) else { return false };
-        let best = search.candidates(&cloth, &settings).first().map_or(f64::MIN, |c| c.score);
-        best <= given.score + BETTER_ELSEWHERE
+        let is_worn = |search: &Search, cloth: &Cloth, judge: &Judge| {
+            let outward = outward_area(cloth.positions, cloth.faces, cloth.topology, search.surface());
+            if outward.into_iter().any(|area| area < 0.0) || stray(search, cloth, judge).is_some() {
+                return false;
+            }
+            let Ok(given) = search.believed_as_given(cloth, &settings) else { return false };
+            let best = search.candidates(cloth, &settings).first().map_or(f64::MIN, |c| c.score);
+            best <= given.score + BETTER_ELSEWHERE
+        };
+        mesh.face_count() >= MIN_TRIANGLES && self.look(mesh, body, is_worn)
     }
 }
 

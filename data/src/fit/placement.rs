@@ -129,7 +129,7 @@ named!(UpAxis, "up axis");
 /// Where the origin of the file was taken to be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Origin {
+pub enum FileOrigin {
     /// At the pelvis joint, as here.
     #[default]
     Pelvis,
@@ -151,7 +151,7 @@ pub struct Placement {
     /// Turn about the vertical after the up axis (degrees, counter-clockwise seen from above).
     pub turn_degrees: f64,
     /// Where the file's origin is.
-    pub origin: Origin,
+    pub origin: FileOrigin,
     /// Translation after scaling and turning (m).
     pub translation: [f64; 3],
     /// How far the arms of the garment hang below the horizontal (degrees); 0 is a T-pose.
@@ -166,7 +166,7 @@ impl Placement {
         unit: Unit::M,
         up: UpAxis::Y,
         turn_degrees: 0.0,
-        origin: Origin::Pelvis,
+        origin: FileOrigin::Pelvis,
         translation: [0.0; 3],
         arm_angle_degrees: 0.0,
         leg_angle_degrees: 0.0,
@@ -225,7 +225,7 @@ mod tests {
                     unit: Unit::Cm,
                     up,
                     turn_degrees,
-                    origin: Origin::Pelvis,
+                    origin: FileOrigin::Pelvis,
                     ..Placement::AS_GIVEN
                 };
                 let m = placement.turn();

@@ -2,7 +2,7 @@
 
 use super::cloth::Cloth;
 use super::judge::Candidate;
-use super::placement::Origin;
+use super::placement::FileOrigin;
 use super::search::Search;
 use super::sitting::Sitting;
 
@@ -27,7 +27,7 @@ impl Search<'_> {
         let Candidate { placement, piercing, rim_distance, neck_over_hem, .. } = *candidate;
         let (sitting, height) = self.measured(cloth, &placement);
         // Sleeves made for other arms miss these ones where a file says where it is; a place that was searched for must do without.
-        let missed = if placement.origin == Origin::Elsewhere { piercing.arms } else { 0 };
+        let missed = if placement.origin == FileOrigin::Elsewhere { piercing.arms } else { 0 };
         let bones = piercing.others + missed;
         let reasons = [
             (!candidate.is_worn, "no opening goes around the trunk, the neck or both arms".into()),
@@ -85,7 +85,7 @@ impl Readings {
                 (_, None) => found.believed.push(*candidate),
                 (sitting, Some(why)) => {
                     found.is_near |= found.refused.is_empty()
-                        && candidate.placement.origin != Origin::Elsewhere
+                        && candidate.placement.origin != FileOrigin::Elsewhere
                         && sitting.inside < MOST_INSIDE
                         && sitting.mean_distance < TOUCHING_DISTANCE;
                     found.refused.push((*candidate, why));

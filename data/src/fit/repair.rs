@@ -4,7 +4,7 @@
 use super::error::FitError;
 use super::report::{Elements, MeshPiece, RepairKind, SeamReport};
 use super::settings::{FitSettings, Keep, MAX_VERTICES, MIN_TRIANGLES};
-use super::sheet::{Corner, Sheet, SheetBorder};
+use super::sheet::{Corner, RepairSheet};
 use crate::format::PolygonMesh;
 use crate::mesh::{
     AREA_SHARE, JoinedSheet, Seam, WELD_SHARE, clean_faces, diagonal, join_faces, join_seams, open_seams,
@@ -27,7 +27,7 @@ const OUTER_SHARE: [f64; 2] = [0.3, 0.7];
 
 /// Everything that needs neither body nor unit: weld, triangulate, drop, cut, orient each piece; keep what is asked for; join
 /// borders that coincide.
-pub(super) fn repair(file: &PolygonMesh, settings: &FitSettings) -> Result<Sheet, FitError> {
+pub(super) fn repair(file: &PolygonMesh, settings: &FitSettings) -> Result<RepairSheet, FitError> {
     let mut sheet = manifold(file)?;
     match settings.keep {
         Keep::All => refuse_thickness(&sheet)?,
@@ -55,7 +55,7 @@ pub(crate) fn is_double(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> bool {
     thickness(positions, faces).or_else(|| sheets(positions, faces)).is_some()
 }
 
-fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
+fn manifold(file: &PolygonMesh) -> Result<RepairSheet, FitError> {
     let mut cut = triangulate(&file.positions, file.polygons());
     let far = far_vertices(&file.positions, &cut.faces);
     let stays: Vec<bool> =
@@ -90,8 +90,15 @@ fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
     let face_origin = clean.kept.iter().map(|f| cut.polygon[*f as usize]).collect();
     let turned = vec![false; faces.len()];
     let positions = welded.positions;
-    let mut sheet =
-        Sheet { positions, faces, face_origin, corners, turned, welded: compact, ..Sheet::default() };
+    let mut sheet = RepairSheet {
+        positions,
+        faces,
+        face_origin,
+        corners,
+        turned,
+        welded: compact,
+        ..RepairSheet::default()
+    };
     let made = oriented(&mut sheet);
 
     let file_vertex = |w: u32| used_vertices[welded.origin[w as usize] as usize];
@@ -155,7 +162,7 @@ struct Oriented {
 }
 
 /// Cuts where more than two faces meet, gives each piece one direction and vertices of its own.
-fn oriented(sheet: &mut Sheet) -> Oriented {
+fn oriented(sheet: &mut RepairSheet) -> Oriented {
     let (joined, crowded) = join_faces(&sheet.positions, &sheet.faces);
     for f in orient(&mut sheet.faces, &joined) {
         sheet.corners[f as usize].swap(1, 2);
@@ -166,7 +173,7 @@ fn oriented(sheet: &mut Sheet) -> Oriented {
     Oriented { origin: split.origin, crowded, twisted: split.twisted }
 }
 
-fn refuse_thickness(sheet: &Sheet) -> Result<(), FitError> {
+fn refuse_thickness(sheet: &RepairSheet) -> Result<(), FitError> {
     match thickness(&sheet.positions, &sheet.outward_faces()) {
         Some(thickness) => {
             let share = thickness / diagonal(&sheet.positions);
@@ -183,7 +190,7 @@ fn refuse_thickness(sheet: &Sheet) -> Result<(), FitError> {
 
 /// Keeps the outer sheet of cloth with thickness, or the larger one of two pieces that lie in each other; cloth without either
 /// stays as it is.
-fn keep_outer(sheet: &mut Sheet, file: &PolygonMesh) -> Result<(), FitError> {
+fn keep_outer(sheet: &mut RepairSheet, file: &PolygonMesh) -> Result<(), FitError> {
     let faces = sheet.outward_faces();
     if thickness(&sheet.positions, &faces).is_none() {
         if sheets(&sheet.positions, &faces).is_some() {
@@ -206,7 +213,7 @@ fn keep_outer(sheet: &mut Sheet, file: &PolygonMesh) -> Result<(), FitError> {
 }
 
 /// Keeps the connected piece with the largest area and lists the others.
-fn keep_largest(sheet: &mut Sheet, file: &PolygonMesh) {
+fn keep_largest(sheet: &mut RepairSheet, file: &PolygonMesh) {
     let Ok(mesh) = sheet.mesh() else { return };
     let topology = Topology::new(&mesh);
     let mut pieces = MeshPiece::all(&mesh, &topology);
@@ -222,7 +229,7 @@ fn keep_largest(sheet: &mut Sheet, file: &PolygonMesh) {
 }
 
 /// Joins borders within `reach` (in the file's unit), without it those that coincide.
-fn join(sheet: &mut Sheet, file: &PolygonMesh, reach: Option<f64>) {
+fn join(sheet: &mut RepairSheet, file: &PolygonMesh, reach: Option<f64>) {
     let Some(joined) = join_seams(&sheet.positions, &sheet.faces, reach) else { return };
     let JoinedSheet { positions, faces, parent, became, seams } = joined;
     let touched: Vec<u32> = (0..became.len() as u32).filter(|v| became[*v as usize] != *v).collect();
@@ -239,7 +246,7 @@ fn join(sheet: &mut Sheet, file: &PolygonMesh, reach: Option<f64>) {
 /// What needs the unit: joins borders within the distance that is asked for and lists the seams that stay open. `metres` of
 /// the file's unit.
 pub(super) fn finish_seams(
-    sheet: &mut Sheet,
+    sheet: &mut RepairSheet,
     file: &PolygonMesh,
     settings: &FitSettings,
     metres: f64,
@@ -254,21 +261,19 @@ pub(super) fn finish_seams(
 
 /// Borders that are not among those of `before` and that no limb passes through: gaps in seams that were joined.
 pub(super) fn gaps(
-    borders: &[SheetBorder],
-    before: &[SheetBorder],
+    borders: &[(Vec<u32>, Seam)],
+    before: &[(Vec<u32>, Seam)],
     is_linked: &[bool],
     metres: f64,
 ) -> Vec<SeamReport> {
-    let is_gap = |(border, is_linked): &(&SheetBorder, &bool)| {
-        !**is_linked && before.iter().all(|known| known.vertices != border.vertices)
-    };
-    let gaps = borders.iter().zip(is_linked).filter(is_gap);
-    gaps.map(|(gap, _)| SeamReport::new(&gap.as_seam(), metres, false)).collect()
+    let unlinked = borders.iter().zip(is_linked).filter(|(_, is_linked)| !**is_linked);
+    let gaps = unlinked.filter(|((vertices, _), _)| before.iter().all(|(known, _)| known != vertices));
+    gaps.map(|((_, seam), _)| SeamReport::new(seam, metres, false)).collect()
 }
 
 /// Turns every piece whose area faces the body more than away from it, and reports all faces that differ from the file.
 pub(super) fn turn_outward(
-    sheet: &mut Sheet,
+    sheet: &mut RepairSheet,
     positions: &[[f64; 3]],
     topology: &Topology,
     body: &Surface<f64>,
@@ -286,7 +291,7 @@ pub(super) fn turn_outward(
     sheet.note(RepairKind::TurnedFaces, Elements::Faces(turned));
 }
 
-impl Sheet {
+impl RepairSheet {
     /// Faces with their front outside where they enclose something: behind them is the cloth.
     fn outward_faces(&self) -> Vec<[u32; 3]> {
         match self.mesh().is_ok_and(|mesh| is_inside_out(&mesh)) {

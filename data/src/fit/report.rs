@@ -5,7 +5,7 @@ mod seams;
 pub use seams::SeamReport;
 
 use super::from_body::SourcePlacement;
-use super::placement::{Origin, Placement};
+use super::placement::{FileOrigin, Placement};
 use super::sitting::Sitting;
 use crate::asset::Category;
 use crate::mesh::MeshMeasures;
@@ -270,12 +270,12 @@ impl FitReport {
         let p = &self.placement;
         let [x, y, z] = p.translation.map(|t| 1e3 * t);
         let origin = match p.origin {
-            Origin::Pelvis => "the file's origin is the pelvis of the body".to_string(),
-            Origin::Floor => {
+            FileOrigin::Pelvis => "the file's origin is the pelvis of the body".to_string(),
+            FileOrigin::Floor => {
                 format!("the file's origin is on the floor below the pelvis (moved by {y:.0} mm)")
             }
-            Origin::SourceBody => self.from_body.as_ref().map(SourcePlacement::text).unwrap_or_default(),
-            Origin::Elsewhere => {
+            FileOrigin::SourceBody => self.from_body.as_ref().map(SourcePlacement::text).unwrap_or_default(),
+            FileOrigin::Elsewhere => {
                 format!("the file's origin is not the body's: moved by {x:.0}, {y:.0}, {z:.0} mm")
             }
         };

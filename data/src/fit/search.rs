@@ -3,15 +3,15 @@
 
 mod limbs;
 
-use super::anatomy::Skeleton;
+use super::anatomy::BodySkeleton;
 use super::body_field::{BodyField, LimbTurn};
-use super::climb::{Moves, Steps, climbed};
+use super::climb::{ClimbSteps, Moves, climbed};
 use super::cloth::Cloth;
 use super::coverage::off_trunk;
 use super::error::FitError;
 use super::judge::{Candidate, Judge};
 use super::limb_pose::LimbPose;
-use super::placement::{Origin, Placement, Unit};
+use super::placement::{FileOrigin, Placement, Unit};
 use super::settings::FitSettings;
 use super::sitting::Sitting;
 use crate::asset::Body;
@@ -45,7 +45,7 @@ const PROBE: f64 = 0.025;
 /// What is measured on a body once, for all garments.
 pub(super) struct SearchBody {
     pub(super) field: BodyField,
-    skeleton: Skeleton,
+    skeleton: BodySkeleton,
     surface: Surface<f64>,
     /// The field of the body with its legs apart; made here, since the body is shared by threads afterwards.
     apart: BodyField,
@@ -64,7 +64,7 @@ impl SearchBody {
         }
         let surface = Surface::new(body.template.clone(), body.faces.clone());
         let reach = body.zero_body().extent();
-        let (field, skeleton) = (BodyField::new(body), Skeleton::new(body));
+        let (field, skeleton) = (BodyField::new(body), BodySkeleton::new(body));
         let placement = Placement { leg_angle_degrees: LEGS_APART, ..Placement::AS_GIVEN };
         let apart = field.posed(&LimbPose::of(body, &placement), body);
         Ok(Self { field, skeleton, surface, apart, reach })
@@ -148,7 +148,7 @@ impl<'a> Search<'a> {
         sort(&mut found);
         let mut best = distinct(found);
         best.truncate(JUDGED);
-        let steps = Steps { from: 0.01, to: 0.0005, is_sharp: true, is_fine: true, moves: Moves::All };
+        let steps = ClimbSteps { from: 0.01, to: 0.0005, is_sharp: true, is_fine: true, moves: Moves::All };
         let mut last: Vec<Candidate> = best
             .par_iter()
             .map(|c| judge.judged(climbed(&judge, c, &steps).placement))
@@ -164,55 +164,40 @@ impl<'a> Search<'a> {
 
     /// The best of one scale and turn.
     fn climbed_from(&self, base: &Placement, judge: &Judge) -> Vec<Candidate> {
-        let mut starts = self.starts_by_rim(base, judge);
-        sort(&mut starts);
-        starts.truncate(FROM_RIMS);
-        let mut others = self.starts_by_height(base, judge);
-        sort(&mut others);
-        others.truncate(ROUGH_STARTS);
-        starts.extend(others);
-        let worn = starts.into_iter().map(|c| judge.with_openings(c)).filter(|c| c.is_worn).collect();
-        let roughly = Steps { from: 0.04, to: 0.01, is_sharp: false, is_fine: false, moves: Moves::All };
-        let sharply = Steps { from: 0.019, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::All };
+        let rims = best_of(self.starts_by_rim(base, judge), FROM_RIMS);
+        let heights = best_of(self.starts_by_height(base, judge), ROUGH_STARTS);
+        let starts = rims.into_iter().chain(heights).map(|c| judge.with_openings(c));
+        let roughly = ClimbSteps { from: 0.04, to: 0.01, is_sharp: false, is_fine: false, moves: Moves::All };
+        let sharply =
+            ClimbSteps { from: 0.019, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::All };
         let climb = |c: Candidate| {
             let rough = judge.with_openings(climbed(judge, &c, &roughly));
             judge.with_openings(climbed(judge, &rough, &sharply))
         };
-        distinct(worn).into_iter().take(CLIMBED).map(climb).collect()
+        distinct(starts.filter(|c| c.is_worn).collect()).into_iter().take(CLIMBED).map(climb).collect()
     }
 
     /// The middle of the garment in front of, at and behind the middle of the trunk, its top at every height, with every angle of
     /// the arms.
     fn starts_by_height(&self, base: &Placement, judge: &Judge) -> Vec<Candidate> {
+        let BodyField { low: floor, high: crown, spine_z, .. } = self.measured.field;
         let turned = judge.turned(base, None, false);
         let [low, high] = bounds(&turned.points);
         let [x, z] = [0, 2].map(|a| 0.5 * (low[a] + high[a]));
-        let heights = ((self.measured.field.high[1] - self.measured.field.low[1]) / HEIGHT_STEP) as usize;
-        let places: Vec<[f64; 3]> = match judge.settings.offset {
-            Some(offset) => vec![offset],
-            None => (0..heights)
-                .flat_map(|h| FORWARD_STEPS.map(|forward| (h, forward)))
-                .map(|(h, forward)| {
-                    let top = self.measured.field.low[1] + 0.2 + h as f64 * HEIGHT_STEP;
-                    [-x, top - high[1], self.measured.field.spine_z - z + forward]
-                })
-                .collect(),
+        let heights = ((crown[1] - floor[1]) / HEIGHT_STEP) as usize;
+        let at = |height: usize, forward: f64| {
+            let top = floor[1] + 0.2 + height as f64 * HEIGHT_STEP;
+            [-x, top - high[1], spine_z - z + forward]
         };
+        let all = || (0..heights).flat_map(|height| FORWARD_STEPS.map(|forward| at(height, forward)));
+        let places = judge.settings.offset.map_or_else(|| all().collect(), |offset| vec![offset]);
         let allowed = |a: &f64| judge.settings.arms_lowered.is_none_or(|lowered| lowered == (*a != 0.0));
-        let mut all = Vec::new();
-        for arm_angle_degrees in ARM_ANGLES.into_iter().filter(allowed) {
-            let at = |translation: &[f64; 3]| {
-                let p = Placement {
-                    translation: *translation,
-                    arm_angle_degrees,
-                    origin: Origin::Elsewhere,
-                    ..*base
-                };
-                judge.scored(Candidate::at(p), &turned, false)
-            };
-            all.extend(places.iter().map(at));
-        }
-        all
+        let with_arms = |arm_angle_degrees: f64| {
+            let base = Placement { arm_angle_degrees, origin: FileOrigin::Elsewhere, ..*base };
+            places.iter().map(move |translation| Placement { translation: *translation, ..base })
+        };
+        let placements = ARM_ANGLES.into_iter().filter(allowed).flat_map(with_arms);
+        placements.map(|p| judge.scored(Candidate::at(p), &turned, false)).collect()
     }
 
     /// Each of the longest borders around the trunk, at every height.
@@ -220,25 +205,25 @@ impl<'a> Search<'a> {
         if judge.settings.offset.is_some() || judge.settings.arms_lowered == Some(true) {
             return Vec::new();
         }
+        let BodyField { levels, spine_z, .. } = self.measured.field;
         let mut borders: Vec<usize> = (0..judge.cloth.borders.len()).collect();
         let length = |border: &usize| judge.cloth.border_lengths[*border];
         borders.sort_by(|a, b| length(b).total_cmp(&length(a)));
-        let mut all = Vec::new();
-        for &border in borders.iter().take(3) {
+        let of_border = |border: usize| {
             let turned = judge.turned(base, Some(border), false);
             let sum = turned.rim.iter().fold([0.0; 3], |sum, p| add(sum, *p));
-            let centre = sum.map(|x| x / turned.rim.len().max(1) as f64);
-            for height in 0..RIM_HEIGHTS {
-                let y = self.measured.field.levels.waist - BELOW_WAIST + RIM_STEP * height as f64;
-                for forward in [0.0, 0.03] {
-                    let translation =
-                        [-centre[0], y - centre[1], self.measured.field.spine_z + forward - centre[2]];
-                    let p = Placement { translation, origin: Origin::Elsewhere, ..*base };
-                    all.push(judge.scored(Candidate::at(p), &turned, false));
-                }
-            }
-        }
-        all
+            let [x, y, z] = sum.map(|x| x / turned.rim.len().max(1) as f64);
+            let heights =
+                (0..RIM_HEIGHTS).map(|height| levels.waist - BELOW_WAIST + RIM_STEP * height as f64);
+            let places =
+                heights.flat_map(|height| [0.0, 0.03].map(|forward| [-x, height - y, spine_z + forward - z]));
+            let scored = |translation| {
+                let p = Placement { translation, origin: FileOrigin::Elsewhere, ..*base };
+                judge.scored(Candidate::at(p), &turned, false)
+            };
+            places.map(scored).collect::<Vec<_>>()
+        };
+        borders.into_iter().take(3).flat_map(of_border).collect()
     }
 
     /// The best placement around a candidate, and how much worse (log-posterior) the better one of those a probe's height above
@@ -251,7 +236,7 @@ impl<'a> Search<'a> {
             let at = |dy: f64| {
                 let mut moved = *best;
                 moved.placement.translation[1] += dy;
-                let steps = Steps { from: 0.02, to: 0.001, is_sharp: true, is_fine: true, moves };
+                let steps = ClimbSteps { from: 0.02, to: 0.001, is_sharp: true, is_fine: true, moves };
                 judge.judged(climbed(&judge, &moved, &steps).placement)
             };
             let (below, above) = rayon::join(|| at(-PROBE), || at(PROBE));
@@ -266,6 +251,13 @@ impl<'a> Search<'a> {
 
 fn sort(candidates: &mut [Candidate]) {
     candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+}
+
+/// So many of them, the best first.
+fn best_of(mut candidates: Vec<Candidate>, count: usize) -> Vec<Candidate> {
+    sort(&mut candidates);
+    candidates.truncate(count);
+    candidates
 }
 
 /// Without those close to a better one.

@@ -1,7 +1,7 @@
 //! What is known about a file, and the limits of what fits.
 
 use super::from_body::SourceBody;
-use super::placement::{Origin, Placement, Unit, UpAxis};
+use super::placement::{FileOrigin, Placement, Unit, UpAxis};
 use crate::asset::Category;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -83,8 +83,8 @@ impl FitSettings {
         let arms = if placement.arm_angle_degrees == 0.0 { 0.0 } else { -1.5 };
         let legs = if placement.leg_angle_degrees == 0.0 { 0.0 } else { -1.5 };
         let origin = match placement.origin {
-            Origin::Pelvis => 0.0,
-            Origin::Floor => -0.5,
+            FileOrigin::Pelvis => 0.0,
+            FileOrigin::Floor => -0.5,
             // A place known to a centimetre or two in each direction, of a metre: three free numbers fit a little
             // better anywhere.
             _ => -12.0,

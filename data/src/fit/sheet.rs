@@ -23,26 +23,9 @@ impl Corner {
     }
 }
 
-/// A border of the sheet.
-pub(super) struct SheetBorder {
-    /// Vertices of the file, ascending.
-    pub vertices: Vec<u32>,
-    /// Its longest extent, and how far it reaches from that.
-    length: f64,
-    width: f64,
-}
-
-impl SheetBorder {
-    /// As a seam that stays open.
-    pub fn as_seam(&self) -> Seam {
-        let ends = [0, self.vertices.len() - 1].map(|end| self.vertices[end]);
-        Seam { length: self.length, gap: self.width, widest: self.width, ends, is_joined: false }
-    }
-}
-
 /// Triangles in the file's coordinates.
 #[derive(Default)]
-pub(super) struct Sheet {
+pub(super) struct RepairSheet {
     pub positions: Vec<[f64; 3]>,
     pub faces: Vec<[u32; 3]>,
     /// For each vertex the first vertex of the file that became it.
@@ -65,7 +48,7 @@ pub(super) struct Sheet {
     pub welded: Vec<u32>,
 }
 
-impl Sheet {
+impl RepairSheet {
     /// Its triangles.
     ///
     /// # Errors
@@ -88,16 +71,17 @@ impl Sheet {
     /// Leaves out vertices without a face and numbers the others as the file does.
     pub fn number_as_file(&mut self, file: &PolygonMesh) {
         let polygons: Vec<&[u32]> = file.polygons().collect();
+        // Every corner's vertex, the vertex of the file, and whether it is that itself.
+        let mut known: Vec<(usize, u32, bool)> = Vec::with_capacity(3 * self.faces.len());
+        for ((face, corners), polygon) in self.faces.iter().zip(&self.corners).zip(&self.face_origin) {
+            let of_file = |corner: &Corner| polygons[*polygon as usize][corner.number as usize];
+            known.extend(face.iter().zip(corners).map(|(v, c)| (*v as usize, of_file(c), c.is_own)));
+        }
         let mut origin = vec![u32::MAX; self.positions.len()];
         // Corners that split an edge tell of a vertex only if nothing else does.
         for own in [true, false] {
             let mut found = vec![u32::MAX; self.positions.len()];
-            for ((face, corners), polygon) in self.faces.iter().zip(&self.corners).zip(&self.face_origin) {
-                for (v, corner) in face.iter().zip(corners).filter(|(_, corner)| corner.is_own == own) {
-                    let of_file = polygons[*polygon as usize][corner.number as usize];
-                    found[*v as usize] = found[*v as usize].min(of_file);
-                }
-            }
+            known.iter().filter(|k| k.2 == own).for_each(|(v, f, _)| found[*v] = found[*v].min(*f));
             origin.iter_mut().zip(found).filter(|(o, _)| **o == u32::MAX).for_each(|(o, f)| *o = f);
         }
         let mut order: Vec<u32> =
@@ -110,10 +94,8 @@ impl Sheet {
         self.faces.iter_mut().flatten().for_each(|v| *v = number[*v as usize]);
 
         let mut became = vec![None; file.positions.len()];
-        for ((face, corners), polygon) in self.faces.iter().zip(&self.corners).zip(&self.face_origin) {
-            for (v, corner) in face.iter().zip(corners).filter(|(_, corner)| corner.is_own) {
-                became[polygons[*polygon as usize][corner.number as usize] as usize].get_or_insert(*v);
-            }
+        for (v, of_file, _) in known.iter().filter(|(_, _, is_own)| *is_own) {
+            became[*of_file as usize].get_or_insert(number[*v]);
         }
         // What only faces that were dropped use is where the others at its place are.
         let mut at_place = vec![None; self.positions.len().max(self.welded.len())];
@@ -175,23 +157,23 @@ impl Sheet {
         Seam { ends: seam.ends.map(|v| self.vertex_origin[v as usize]), ..*seam }
     }
 
-    /// All borders, in the order of `topology`, which is the sheet's.
-    pub fn borders(&self, topology: &Topology) -> Vec<SheetBorder> {
+    /// All borders, in the order of `topology`, which is the sheet's: their vertices in the file, ascending, and the seams that
+    /// they are if they stay open.
+    pub fn borders(&self, topology: &Topology) -> Vec<(Vec<u32>, Seam)> {
         let borders = topology.boundary_loops.iter().map(|border| {
-            let distance = |a: u32, b: u32| norm(sub(self.positions[b as usize], self.positions[a as usize]));
-            let farthest = |from: u32| {
-                let of = border.iter().map(|v| (*v, distance(from, *v)));
-                of.fold((from, 0.0), |best, v| if v.1 > best.1 { v } else { best })
+            let from = |a: u32, b: u32| sub(self.positions[b as usize], self.positions[a as usize]);
+            let farthest = |end: u32| {
+                let of = border.iter().map(|v| (*v, norm(from(end, *v))));
+                of.fold((end, 0.0), |best, v| if v.1 > best.1 { v } else { best })
             };
             let end = farthest(border[0]).0;
             let (other, length) = farthest(end);
-            let along = normalized(sub(self.positions[other as usize], self.positions[end as usize]));
-            let aside =
-                |v: &u32| norm(cross(along, sub(self.positions[*v as usize], self.positions[end as usize])));
-            let width = border.iter().map(aside).fold(0.0, f64::max);
+            let along = normalized(from(end, other));
+            let width = border.iter().map(|v| norm(cross(along, from(end, *v)))).fold(0.0, f64::max);
             let mut vertices: Vec<u32> = border.iter().map(|v| self.vertex_origin[*v as usize]).collect();
             vertices.sort_unstable();
-            SheetBorder { vertices, length, width }
+            let ends = [vertices[0], vertices[vertices.len() - 1]];
+            (vertices, Seam { length, gap: width, widest: width, ends, is_joined: false })
         });
         borders.collect()
     }

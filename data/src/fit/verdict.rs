@@ -4,7 +4,7 @@ use super::cloth::Cloth;
 use super::diagnosis::size_doubt;
 use super::error::FitError;
 use super::judge::Candidate;
-use super::placement::{Origin, Placement, Unit};
+use super::placement::{FileOrigin, Placement, Unit};
 use super::readings::{MOST_INSIDE, NEAR_TIE, Readings};
 use super::report::outfit_warning;
 use super::search::Search;
@@ -24,7 +24,7 @@ pub(super) const ARMS_MISS: &str = "arms of the body pass through the cloth of i
 
 /// Where a file as it stands lies snugly on head, arms or feet: a band around the head is none around the chest of another unit.
 fn lies_off_trunk(candidate: &Candidate, search: &Search, cloth: &Cloth) -> Option<&'static str> {
-    if candidate.placement.origin == Origin::Elsewhere || !cloth.is_tubes() {
+    if candidate.placement.origin == FileOrigin::Elsewhere || !cloth.is_tubes() {
         return None;
     }
     let place = search.off_trunk(cloth, &candidate.placement)?;
@@ -33,7 +33,7 @@ fn lies_off_trunk(candidate: &Candidate, search: &Search, cloth: &Cloth) -> Opti
 }
 
 /// A placement, and what is not certain about it, with the flags that settle it.
-pub(super) struct Verdict {
+pub(super) struct PlacementVerdict {
     pub placement: Placement,
     pub doubts: Vec<String>,
     /// Whether it is taken because hints say so, though it does not look worn.
@@ -49,7 +49,7 @@ pub(super) fn verdict(
     search: &Search,
     cloth: &Cloth,
     settings: &FitSettings,
-) -> Result<Verdict, FitError> {
+) -> Result<PlacementVerdict, FitError> {
     let Readings { believed, refused, is_near } = Readings::new(candidates, search, cloth);
     let mut doubts: Vec<String> = Vec::new();
     let Some(candidate) = believed.first().or(refused.first().map(|(best, _)| best)).copied() else {
@@ -76,7 +76,7 @@ pub(super) fn verdict(
             false => return Err(FitError::Size { size }),
         }
     }
-    let is_usual = candidate.placement.origin != Origin::Elsewhere || settings.offset.is_some();
+    let is_usual = candidate.placement.origin != FileOrigin::Elsewhere || settings.offset.is_some();
     let (candidate, least_loss) = match is_usual {
         true => (candidate, f64::INFINITY),
         false => search.probed(cloth, settings, candidate),
@@ -140,7 +140,7 @@ pub(super) fn verdict(
             "little tells that its {limbs} are {angle:.0}° from the rest pose (log-odds {margin:.1}); {flag} if they are not"
         ));
     }
-    Ok(Verdict { placement: taken, doubts, is_odd: believed.is_empty() })
+    Ok(PlacementVerdict { placement: taken, doubts, is_odd: believed.is_empty() })
 }
 
 /// Flags by which the placement taken differs from another, as they fix the one taken.

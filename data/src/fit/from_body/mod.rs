@@ -27,7 +27,7 @@ pub(super) use same_model::{POSE_ROUNDS, SameModel};
 pub use source::SourceBody;
 
 use super::error::FitError;
-use super::placement::{Origin, Placement, Unit, UpAxis};
+use super::placement::{FileOrigin, Placement, Unit, UpAxis};
 use super::settings::FitSettings;
 use crate::asset::body::skin;
 use crate::asset::{Body, Category};
@@ -40,8 +40,7 @@ use icp::Similarity;
 use registration::{RegisteredMesh, register};
 use same_model::{RecoveredMesh, SHAPE_ROUNDS, has_topology, recovered};
 use serde::Serialize;
-use source::SourceKind;
-use std::sync::Arc;
+use source::{SourceKind, SourceMesh, SourceModel};
 
 /// What was done with a garment that was made on another body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -106,15 +105,13 @@ impl SourcePlacement {
 pub(super) struct Aligned {
     /// From the file to the source body, in metres with y up.
     pub placement: Placement,
-    name: String,
-    shape: Vec<f64>,
     /// The surface on which the garment was made (m).
-    positions: Vec<[f64; 3]>,
-    faces: Arc<[[u32; 3]]>,
+    source: Surface<f64>,
     to_model: ToModel,
     /// The target's model, on which the garment lies then.
     model: SameModel,
-    alignment_mm: Option<f64>,
+    /// What is said of it, but for how far the garment moves.
+    report: SourcePlacement,
 }
 
 /// How cloth on the source body comes to the target's model.
@@ -143,70 +140,18 @@ impl SourceBody {
                 return Err(wrong(format!("the body says {says}; leave {flag} out")));
             }
         }
-        let name = self.name.clone();
+        let report = SourcePlacement {
+            body: self.name.clone(),
+            shape: Vec::new(),
+            carried: Carried::Shape,
+            alignment_mm: None,
+            pelvis: None,
+            scale: 1.0,
+            moved_mm: 0.0,
+        };
         match &self.kind {
-            SourceKind::Model(source) => {
-                let placement = Placement {
-                    unit: settings.unit.unwrap_or(Unit::M),
-                    up: settings.up.unwrap_or(UpAxis::Y),
-                    turn_degrees: settings.turn_degrees.unwrap_or(0.0),
-                    origin: Origin::SourceBody,
-                    translation: settings.offset.unwrap_or(scale(source.pelvis, -1.0)),
-                    ..Placement::AS_GIVEN
-                };
-                let own = &source.body;
-                let (shape, positions, faces) =
-                    (source.shape.clone(), own.template.clone(), own.faces.clone());
-                if has_topology(body, &faces) {
-                    let (to_model, model) = (ToModel::Identity, SameModel::shaped(positions.clone()));
-                    return Ok(Aligned {
-                        placement,
-                        name,
-                        shape,
-                        positions,
-                        faces,
-                        to_model,
-                        model,
-                        alignment_mm: None,
-                    });
-                }
-                let bones = similarities(own, body).map_err(wrong)?;
-                let model = SameModel::shaped(body.template.clone());
-                let alignment_mm =
-                    Some(apart_mm(&skinned(own, &bones), &Surface::from_mesh(&body.zero_body())));
-                let to_model = ToModel::Bones(Box::new(own.clone()), bones);
-                Ok(Aligned { placement, name, shape, positions, faces, to_model, model, alignment_mm })
-            }
-            SourceKind::Mesh(mesh) => {
-                // Vertices in another order, or of another model by chance, are a mesh like any other.
-                if let Some(found) = recovered(mesh, body, settings) {
-                    let RecoveredMesh { placement, shape, model, residual_mm } = found;
-                    let (positions, faces) = (model.positions().to_vec(), body.faces.clone());
-                    let (to_model, alignment_mm) = (ToModel::Identity, Some(residual_mm));
-                    return Ok(Aligned {
-                        placement,
-                        name,
-                        shape,
-                        positions,
-                        faces,
-                        to_model,
-                        model,
-                        alignment_mm,
-                    });
-                }
-                let found = register(&mesh.surface, body, settings).map_err(wrong)?;
-                let RegisteredMesh { placement, motion, model, alignment_mm } = found;
-                Ok(Aligned {
-                    placement,
-                    name,
-                    shape: model.shape.clone(),
-                    positions: placement.apply(mesh.surface.positions()),
-                    faces: mesh.surface.faces().into(),
-                    to_model: ToModel::Registration(motion),
-                    model: SameModel::posed(body, model).map_err(wrong)?,
-                    alignment_mm: Some(alignment_mm),
-                })
-            }
+            SourceKind::Model(source) => Aligned::of_model(source, body, settings, report).map_err(wrong),
+            SourceKind::Mesh(mesh) => Aligned::of_mesh(mesh, body, settings, report).map_err(wrong),
         }
     }
 }
@@ -222,6 +167,74 @@ fn skinned(body: &Body, bones: &[[[f64; 4]; 3]]) -> Vec<[f64; 3]> {
 }
 
 impl Aligned {
+    fn of_model(
+        source: &SourceModel,
+        body: &Body,
+        settings: &FitSettings,
+        report: SourcePlacement,
+    ) -> Result<Self, String> {
+        let translation = settings.offset.unwrap_or(scale(source.pelvis, -1.0));
+        let placement = Placement {
+            unit: settings.unit.unwrap_or(Unit::M),
+            up: settings.up.unwrap_or(UpAxis::Y),
+            turn_degrees: settings.turn_degrees.unwrap_or(0.0),
+            origin: FileOrigin::SourceBody,
+            translation,
+            ..Placement::AS_GIVEN
+        };
+        let pelvis = Some(translation.map(|x| 0.0 - x));
+        let report = SourcePlacement { shape: source.shape.clone(), pelvis, ..report };
+        let own = &source.body;
+        let surface = Surface::from_mesh(&own.zero_body());
+        if has_topology(body, &own.faces) {
+            let (to_model, model) = (ToModel::Identity, SameModel::shaped(own.template.clone()));
+            return Ok(Self { placement, source: surface, to_model, model, report });
+        }
+        let bones = similarities(own, body)?;
+        let alignment_mm = Some(apart_mm(&skinned(own, &bones), &Surface::from_mesh(&body.zero_body())));
+        Ok(Self {
+            placement,
+            source: surface,
+            to_model: ToModel::Bones(Box::new(own.clone()), bones),
+            model: SameModel::shaped(body.template.clone()),
+            report: SourcePlacement { carried: Carried::Bones, alignment_mm, ..report },
+        })
+    }
+
+    fn of_mesh(
+        mesh: &SourceMesh,
+        body: &Body,
+        settings: &FitSettings,
+        report: SourcePlacement,
+    ) -> Result<Self, String> {
+        // Vertices in another order, or of another model by chance, are a mesh like any other.
+        if let Some(RecoveredMesh { placement, shape, model, residual_mm }) = recovered(mesh, body, settings)
+        {
+            let source = Surface::new(model.positions().to_vec(), body.faces.clone());
+            let (carried, alignment_mm) = (Carried::PoseAndShape, Some(residual_mm));
+            let pelvis = Some(placement.translation.map(|x| 0.0 - x));
+            let report = SourcePlacement { shape, carried, alignment_mm, pelvis, ..report };
+            return Ok(Self { placement, source, to_model: ToModel::Identity, model, report });
+        }
+        let RegisteredMesh { placement, motion, model, alignment_mm } =
+            register(&mesh.surface, body, settings)?;
+        let positions = placement.apply(mesh.surface.positions());
+        let report = SourcePlacement {
+            shape: model.shape.clone(),
+            carried: Carried::Registration,
+            alignment_mm: Some(alignment_mm),
+            scale: motion.scale,
+            ..report
+        };
+        Ok(Self {
+            placement,
+            source: Surface::new(positions, mesh.surface.faces().into()),
+            to_model: ToModel::Registration(motion),
+            model: SameModel::posed(body, model)?,
+            report,
+        })
+    }
+
     /// A garment that does not lie on its body.
     pub fn not_on_it(&self, where_it_is: &str) -> FitError {
         let what = format!(
@@ -229,14 +242,14 @@ impl Aligned {
              export both together, or say how the garment's coordinates differ by --unit, --up, --turn and, beside an npz, --offset; \
              an npz takes shape parameters as body.npz:1.2,-0.5"
         );
-        FitError::SourceBody { name: self.name.clone(), what }
+        FitError::SourceBody { name: self.report.body.clone(), what }
     }
 
     /// What is odd about a garment where its body puts it.
     pub fn doubt(&self, what: &str) -> String {
         format!(
             "placed through {}, the garment looks odd: {what}: was it made on this body, and are both in the same coordinates?",
-            self.name
+            self.report.body
         )
     }
 
@@ -251,58 +264,38 @@ impl Aligned {
         category: Option<Category>,
         body: &Body,
     ) -> Result<(Vec<[f64; 3]>, SourcePlacement), FitError> {
-        let source = Surface::new(self.positions.clone(), self.faces.clone());
         let placed = self.placement.apply(positions);
-        let lies = Lies::new(&placed, &source);
-        if let Some(where_it_is) = lies.implausible() {
+        let gaps = gaps_to(&placed, &self.source);
+        if let Some(where_it_is) = off_its_body(&gaps) {
             return Err(self.not_on_it(&where_it_is));
         }
         let rest = |positions: &[[f64; 3]]| {
             let cloth = SourceCloth { positions, faces, category };
             self.model.carry(&cloth, body, SHAPE_ROUNDS).map_err(FitError::Mesh)
         };
-        let restored = |mut positions: Vec<[f64; 3]>, factor: f64| {
-            let gaps: Vec<f64> = gaps_to(&placed, &source).into_iter().map(|gap| factor * gap).collect();
+        let restored = |mut positions: Vec<[f64; 3]>| {
+            let gaps: Vec<f64> = gaps.iter().map(|gap| self.report.scale * gap).collect();
             let target = Surface::new(self.model.positions().to_vec(), body.faces.clone());
             restore(&mut positions, faces, &gaps, &target);
             rest(&positions)
         };
-        let (mut how, mut base, mut scale) = (Carried::Shape, placed.clone(), 1.0);
-        let carried = match &self.to_model {
-            ToModel::Identity => {
-                if self.model.is_posed() {
-                    how = Carried::PoseAndShape;
-                }
-                rest(&placed)?
-            }
+        let (carried, base) = match &self.to_model {
+            ToModel::Identity => (rest(&placed)?, placed),
             ToModel::Bones(own, bones) => {
-                how = Carried::Bones;
                 let cloth = SourceCloth { positions: &placed, faces, category };
                 let binding = cloth.bound(placed.clone(), own, body).map_err(FitError::Mesh)?;
-                restored(binding.skinned(&placed, bones), 1.0)?
+                (restored(binding.skinned(&placed, bones))?, placed)
             }
             ToModel::Registration(motion) => {
-                (how, scale) = (Carried::Registration, motion.scale);
                 let moved: Vec<[f64; 3]> = placed.iter().map(|p| motion.apply(*p)).collect();
-                base = rest(&moved)?;
-                restored(moved, scale)?
+                let unrestored = rest(&moved)?;
+                (restored(moved)?, unrestored)
             }
         };
         let mut moves: Vec<f64> = carried.iter().zip(&base).map(|(a, b)| norm(sub(*a, *b))).collect();
-        let moved_mm = 1e3 * median(&mut moves);
-        let (body, shape) = (self.name.clone(), self.shape.clone());
-        let alignment_mm = self.alignment_mm;
-        let pelvis = (how != Carried::Registration).then(|| self.placement.translation.map(|x| 0.0 - x));
-        Ok((carried, SourcePlacement { body, shape, carried: how, alignment_mm, pelvis, scale, moved_mm }))
+        let report = SourcePlacement { moved_mm: 1e3 * median(&mut moves), ..self.report.clone() };
+        Ok((carried, report))
     }
-}
-
-/// How a garment lies on its source body.
-struct Lies {
-    /// Share of the vertices deeper inside than [`DEEP_INSIDE`].
-    deep: f64,
-    /// Share of the vertices closer to the skin than [`CLOSE_TO_SKIN`].
-    close: f64,
 }
 
 /// Cloth this far inside the body (m) is no tight fit any more.
@@ -315,22 +308,16 @@ const MOST_DEEP: f64 = 0.1;
 /// So was one of which a smaller share is close to the skin.
 const LEAST_CLOSE: f64 = 0.1;
 
-impl Lies {
-    fn new(positions: &[[f64; 3]], source: &Surface<f64>) -> Self {
-        let gaps = gaps_to(positions, source);
-        let share = |is: &dyn Fn(&f64) -> bool| {
-            gaps.iter().filter(|g| is(g)).count() as f64 / gaps.len().max(1) as f64
-        };
-        Self { deep: share(&|g| *g < -DEEP_INSIDE), close: share(&|g| g.abs() < CLOSE_TO_SKIN) }
+/// Where a garment at these signed distances to its source body (m) is, if it does not lie on that.
+fn off_its_body(gaps: &[f64]) -> Option<String> {
+    let share = |is: &dyn Fn(f64) -> bool| {
+        gaps.iter().filter(|gap| is(**gap)).count() as f64 / gaps.len().max(1) as f64
+    };
+    let (deep, close) = (share(&|gap| gap < -DEEP_INSIDE), share(&|gap| gap.abs() < CLOSE_TO_SKIN));
+    let (depth, reach) = (1e3 * DEEP_INSIDE, 1e3 * CLOSE_TO_SKIN);
+    if deep > MOST_DEEP {
+        return Some(format!("{:.0} % of the garment is more than {depth:.0} mm inside it", 100.0 * deep));
     }
-
-    fn implausible(&self) -> Option<String> {
-        if self.deep > MOST_DEEP {
-            let (share, depth) = (100.0 * self.deep, 1e3 * DEEP_INSIDE);
-            return Some(format!("{share:.0} % of the garment is more than {depth:.0} mm inside it"));
-        }
-        let (share, reach) = (100.0 * self.close, 1e3 * CLOSE_TO_SKIN);
-        (self.close < LEAST_CLOSE)
-            .then(|| format!("only {share:.0} % of the garment is within {reach:.0} mm of its skin"))
-    }
+    (close < LEAST_CLOSE)
+        .then(|| format!("only {:.0} % of the garment is within {reach:.0} mm of its skin", 100.0 * close))
 }

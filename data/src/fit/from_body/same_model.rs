@@ -6,7 +6,7 @@ use crate::asset::body::unskin;
 use crate::asset::rotation;
 use crate::asset::{Body, KnownShape, recover_body};
 use crate::fit::limb_pose::LimbPose;
-use crate::fit::placement::{Origin, Placement, Unit};
+use crate::fit::placement::{FileOrigin, Placement, Unit};
 use crate::fit::settings::FitSettings;
 use clothcombo_physics::vec3::{norm, scale, sub};
 
@@ -51,10 +51,6 @@ impl SameModel {
         let shaped = body.shaped(&pose.shape).map_err(|e| e.to_string())?.positions;
         let LimbPose { positions, bones, .. } = pose;
         Ok(Self { shaped, posed: Some(PosedVertices { positions, bones }) })
-    }
-
-    pub fn is_posed(&self) -> bool {
-        self.posed.is_some()
     }
 
     /// Its vertices (m).
@@ -160,7 +156,7 @@ fn axes(vertices: &[[f64; 3]], body: &Body, settings: &FitSettings) -> Option<Pl
     if misfit(&unit).is_nan() || misfit(&unit) > 0.5 {
         return None;
     }
-    let at = Placement { unit, origin: Origin::SourceBody, ..Placement::AS_GIVEN };
+    let at = Placement { unit, origin: FileOrigin::SourceBody, ..Placement::AS_GIVEN };
     let turned =
         |up| settings.turns().into_iter().map(move |turn_degrees| Placement { up, turn_degrees, ..at });
     let candidates = settings.ups().into_iter().flat_map(turned);

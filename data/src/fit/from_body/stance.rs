@@ -2,7 +2,7 @@
 
 use super::gaps::median;
 use crate::asset::Body;
-use crate::fit::placement::{Origin, Placement, Unit};
+use crate::fit::placement::{FileOrigin, Placement, Unit};
 use crate::fit::settings::FitSettings;
 use crate::mesh::bounds;
 
@@ -50,7 +50,7 @@ pub(super) fn stances(points: &[[f64; 3]], body: &Body, settings: &FitSettings) 
         };
         let Some(unit) = unit else { continue };
         for turn_degrees in settings.turns() {
-            let origin = Origin::SourceBody;
+            let origin = FileOrigin::SourceBody;
             let placement = Placement { unit, up, turn_degrees, origin, ..Placement::AS_GIVEN };
             let placed = placement.apply(points);
             let [low, high] = bounds(&placed);

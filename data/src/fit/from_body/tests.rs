@@ -155,7 +155,7 @@ fn an_origin_above_the_pelvis_is_undone_exactly() {
             let fitted = fit(mesh, &body, &settings).unwrap();
             let [median, p95] = errors(&fitted, &garment);
             assert!(median < 1e-6 && p95 < 1e-6, "{category} {source}: {median} {p95}");
-            assert_eq!(fitted.report.placement.origin, Origin::SourceBody);
+            assert_eq!(fitted.report.placement.origin, FileOrigin::SourceBody);
         }
     }
 }

@@ -2,11 +2,11 @@
 
 use super::{Search, distinct, sort};
 use crate::fit::body_field::BodyField;
-use crate::fit::climb::{Moves, Steps, climbed};
+use crate::fit::climb::{ClimbSteps, Moves, climbed};
 use crate::fit::cloth::Cloth;
 use crate::fit::judge::{Candidate, Judge};
 use crate::fit::limb_pose::LimbPose;
-use crate::fit::placement::{Origin, Placement};
+use crate::fit::placement::{FileOrigin, Placement};
 use crate::fit::settings::FitSettings;
 use rayon::prelude::*;
 
@@ -75,8 +75,9 @@ impl Search<'_> {
         let is_posed = judge.field.is_posed(&candidate.placement);
         let posed = if is_posed { None } else { self.posed_field(&candidate.placement) };
         let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..*judge };
-        let moves = if candidate.placement.origin == Origin::Elsewhere { Moves::All } else { Moves::Limbs };
-        let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true, moves };
+        let moves =
+            if candidate.placement.origin == FileOrigin::Elsewhere { Moves::All } else { Moves::Limbs };
+        let steps = ClimbSteps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true, moves };
         judge.judged(climbed(&judge, candidate, &steps).placement)
     }
 

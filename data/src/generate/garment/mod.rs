@@ -36,7 +36,6 @@ pub use design::{
     UpperDesign,
 };
 pub use settings::{GarmentError, GarmentSettings};
-pub(crate) use tube::Tube;
 
 /// Generates garments for one body; measures the body once.
 #[derive(Debug)]
