@@ -8,10 +8,10 @@ use clothcombo_physics::TriMesh;
 const OFF_BODY: f64 = 0.1;
 
 /// The largest extent of a garment, in heights of the body: arms and legs of a jumpsuit spread, with room for a train.
-const LARGEST: f64 = 1.6;
+const LARGEST_EXTENT: f64 = 1.6;
 
 /// The least: a wristband is smaller, but nothing that is draped over a body.
-const SMALLEST: f64 = 0.05;
+const SMALLEST_EXTENT: f64 = 0.05;
 
 /// Why `mesh` does not lie on the zero body of `body` as a garment does, in words; `None` if it does. `gaps` are the signed
 /// distances of its vertices to the body (m), in ascending order.
@@ -32,7 +32,7 @@ pub(super) fn misplacement(
     let (extent, height) = (mesh.extent(), high[1] - low[1]);
     let inside = gaps.iter().filter(|gap| **gap < 0.0).count();
     let percent = 100.0 * inside as f64 / gaps.len() as f64;
-    Some(if extent > LARGEST * height || extent < SMALLEST * height {
+    Some(if extent > LARGEST_EXTENT * height || extent < SMALLEST_EXTENT * height {
         format!("{extent:.3} m large on a body of {height:.2} m: not in metres?")
     } else if least > OFF_BODY {
         format!("{least:.2} m away from body '{name}': another origin or unit?")

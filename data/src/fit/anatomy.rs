@@ -14,7 +14,7 @@ const LIMB_CHAINS: [&[&str]; 5] = [
     &["pelvis", "right_hip", "right_knee", "right_ankle"],
 ];
 /// How far limbs are extended beyond their last joint (m).
-const BEYOND: f64 = 20.0;
+const BEYOND_LIMB: f64 = 20.0;
 
 /// What an opening of a garment goes around.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,7 +76,7 @@ impl BodySkeleton {
             let bones: Vec<Segment> = points.windows(2).map(|pair| [pair[0], pair[1]]).collect();
             let beyond = bones.last().map(|[a, b]| {
                 let along = sub(*b, *a);
-                [*b, add(*b, scale(along, BEYOND / dot(along, along).sqrt().max(1e-9)))]
+                [*b, add(*b, scale(along, BEYOND_LIMB / dot(along, along).sqrt().max(1e-9)))]
             });
             (bones, beyond)
         })

@@ -5,8 +5,8 @@ use clothcombo_physics::Topology;
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 
 /// Sample points for the coarse and for the fine search.
-const COARSE: usize = 200;
-const FINE: usize = 1000;
+const COARSE_SAMPLES: usize = 200;
+const FINE_SAMPLES: usize = 1000;
 /// Points of a border that are looked at, about.
 const BORDER_POINTS: usize = 60;
 
@@ -39,8 +39,8 @@ impl<'a> Cloth<'a> {
             borders,
             border_lengths,
             topology,
-            coarse: spread_over(positions, faces, COARSE),
-            fine: spread_over(positions, faces, FINE),
+            coarse: spread_over(positions, faces, COARSE_SAMPLES),
+            fine: spread_over(positions, faces, FINE_SAMPLES),
         }
     }
 

@@ -14,7 +14,7 @@ use clothcombo_physics::{Topology, TriMesh};
 
 /// Ratio of one size tried to the next, and how many are tried on either side.
 const SIZE_STEP: f64 = 1.2;
-const SIZES: i32 = 8;
+const SIZES_EACH_WAY: i32 = 8;
 /// Another size explains that much more (log-posterior), or nothing is said.
 const SIZE_EVIDENCE: f64 = 12.0;
 /// Cloth farther from the body on average (m), or with a larger share inside it, may be of another size.
@@ -24,7 +24,7 @@ const TIGHT: f64 = 0.05;
 const MOST_PIECES: usize = 3;
 /// A border this near to a plane, as a share of the extent, and with this share of its length, is cut by it.
 const ON_CUT: f64 = 1e-3;
-const CUT: [f64; 2] = [0.25, 0.95];
+const CUT_SHARES: [f64; 2] = [0.25, 0.95];
 /// The rest of that border reaches this far from the plane, as a share of the extent: a hem does not.
 const BEYOND_CUT: f64 = 0.1;
 
@@ -95,7 +95,7 @@ fn other_size(search: &Search, cloth: &Cloth, known: &FitSettings) -> Option<(Si
     };
     let better = |a: &(Size, f64), b: &(Size, f64)| a.1.total_cmp(&b.1);
     // One that is nearer to its own explains what the next one would be told for.
-    let steps = (-SIZES..=SIZES).filter(|k| *k != 0).map(f64::from).chain([-0.75, 0.75]);
+    let steps = (-SIZES_EACH_WAY..=SIZES_EACH_WAY).filter(|k| *k != 0).map(f64::from).chain([-0.75, 0.75]);
     steps.filter_map(|k| at(SIZE_STEP.powf(k))).max_by(better)
 }
 
@@ -118,7 +118,7 @@ fn half(cloth: &Cloth) -> Option<FitError> {
                     }
                 }
                 let share = on / f64::max(all, f64::MIN_POSITIVE);
-                if (CUT[0]..CUT[1]).contains(&share) && reach > BEYOND_CUT * cloth.extent() {
+                if (CUT_SHARES[0]..CUT_SHARES[1]).contains(&share) && reach > BEYOND_CUT * cloth.extent() {
                     return Some(FitError::Half { axis: name, at, share });
                 }
             }

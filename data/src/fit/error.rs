@@ -2,7 +2,7 @@
 
 use super::pieces::StrayPiece;
 use super::placement::{Unit, UpAxis};
-use super::settings::{MAX_VERTICES, MIN_TRIANGLES, MOST_STRETCH};
+use super::settings::{MAX_GARMENT_VERTICES, MIN_TRIANGLES, MOST_STRETCH};
 use std::fmt;
 use thiserror::Error;
 
@@ -46,7 +46,9 @@ impl fmt::Display for Size {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum FitError {
     /// Too many vertices.
-    #[error("{vertices} vertices, more than the {MAX_VERTICES} a garment may have; decimate it first")]
+    #[error(
+        "{vertices} vertices, more than the {MAX_GARMENT_VERTICES} a garment may have; decimate it first"
+    )]
     TooManyVertices {
         /// After welding.
         vertices: usize,

@@ -25,27 +25,27 @@ const MIXTURE: [f64; 3] = [0.54, 0.40, 0.06];
 const USUAL_EASE: f64 = 0.01;
 
 /// Range and resolution of the tables (m).
-const LOW: f64 = -0.25;
-const HIGH: f64 = 0.25;
-const RESOLUTION: f64 = 0.001;
-const TABLE_ROWS: usize = ((HIGH - LOW) / RESOLUTION) as usize + 1;
+const LEAST_TABLE_GAP: f64 = -0.25;
+const LARGEST_TABLE_GAP: f64 = 0.25;
+const TABLE_STEP: f64 = 0.001;
+const TABLE_ROWS: usize = ((LARGEST_TABLE_GAP - LEAST_TABLE_GAP) / TABLE_STEP) as usize + 1;
 
 /// Logarithms of the density of each gap for each ease and spread.
-static SHARP: LazyLock<Vec<[f32; EASE_KINDS]>> = LazyLock::new(|| {
+static SHARP_TABLE: LazyLock<Vec<[f32; EASE_KINDS]>> = LazyLock::new(|| {
     let density =
         |gap, kind| sharp_log_density(gap, EASES[kind % EASES.len()], SPREADS[kind / EASES.len()]) as f32;
     table(|gap| std::array::from_fn(|kind| density(gap, kind)))
 });
 
 /// The same for a garment some centimetres away from its place.
-static ROUGH: LazyLock<Vec<f32>> = LazyLock::new(|| table(|gap| rough_log_density(gap) as f32));
+static ROUGH_TABLE: LazyLock<Vec<f32>> = LazyLock::new(|| table(|gap| rough_log_density(gap) as f32));
 
 fn table<T>(of_gap: impl Fn(f64) -> T) -> Vec<T> {
-    (0..TABLE_ROWS).map(|row| of_gap(LOW + row as f64 * RESOLUTION)).collect()
+    (0..TABLE_ROWS).map(|row| of_gap(LEAST_TABLE_GAP + row as f64 * TABLE_STEP)).collect()
 }
 
 fn row(gap: f64) -> usize {
-    ((gap - LOW) / RESOLUTION + 0.5).clamp(0.0, (TABLE_ROWS - 1) as f64) as usize
+    ((gap - LEAST_TABLE_GAP) / TABLE_STEP + 0.5).clamp(0.0, (TABLE_ROWS - 1) as f64) as usize
 }
 
 /// Logarithm of the density of a gap (1/m).
@@ -73,7 +73,7 @@ pub(super) fn log_likelihood(gaps: impl ExactSizeIterator<Item = (f64, usize)>, 
     let count = gaps.len().max(1) as f64;
     let mut sums = [[0.0f32; EASE_KINDS]; BODY_PARTS];
     for (gap, part) in gaps {
-        sums[part].iter_mut().zip(&SHARP[row(gap)]).for_each(|(s, l)| *s += l);
+        sums[part].iter_mut().zip(&SHARP_TABLE[row(gap)]).for_each(|(s, l)| *s += l);
     }
     let score = |(kind, sum): (usize, &f32)| {
         evidence * f64::from(*sum) / count - EASES[kind % EASES.len()] / USUAL_EASE
@@ -84,7 +84,7 @@ pub(super) fn log_likelihood(gaps: impl ExactSizeIterator<Item = (f64, usize)>, 
 /// The same for a garment that may be some centimetres away from its place.
 pub(super) fn rough_log_likelihood(gaps: impl ExactSizeIterator<Item = (f64, usize)>, evidence: f64) -> f64 {
     let count = gaps.len().max(1) as f64;
-    evidence * gaps.map(|(gap, _)| f64::from(ROUGH[row(gap)])).sum::<f64>() / count
+    evidence * gaps.map(|(gap, _)| f64::from(ROUGH_TABLE[row(gap)])).sum::<f64>() / count
 }
 
 #[cfg(test)]

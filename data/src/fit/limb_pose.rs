@@ -56,7 +56,7 @@ impl LimbPose {
 pub(super) mod tests {
     use super::*;
     use crate::asset::{Binding, BindingSettings, Category, Garment};
-    use crate::fit::from_body::{POSE_ROUNDS, SameModel, SourceCloth};
+    use crate::fit::from_body::{POSE_BINDINGS, SameModel, SourceCloth};
     use crate::generate::garment::generated;
     use crate::generate::mannequin;
 
@@ -76,7 +76,7 @@ pub(super) mod tests {
         let posed = posed(&shirt, &body, [40.0, 0.0]);
         let cloth =
             SourceCloth { positions: &posed, faces: shirt.rest.faces(), category: Some(shirt.category) };
-        let back = SameModel::posed(&body, arms).unwrap().carry(&cloth, &body, POSE_ROUNDS).unwrap();
+        let back = SameModel::posed(&body, arms).unwrap().carry(&cloth, &body, POSE_BINDINGS).unwrap();
         let mut errors: Vec<f64> = back
             .iter()
             .zip(shirt.rest.positions())

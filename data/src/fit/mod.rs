@@ -41,7 +41,7 @@ pub use report::{
     BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind, SeamReport, contact_warnings,
     outfit_warning,
 };
-pub use settings::{FitSettings, Keep, MAX_VERTICES, MIN_TRIANGLES};
+pub use settings::{FitSettings, Keep, MAX_GARMENT_VERTICES, MIN_TRIANGLES};
 pub use sitting::Sitting;
 
 use crate::asset::{Body, Garment};
@@ -54,7 +54,7 @@ use clothcombo_physics::mesh::vertex_normals;
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use diagnosis::diagnosed;
-use from_body::{POSE_ROUNDS, SameModel, SourceCloth};
+use from_body::{POSE_BINDINGS, SameModel, SourceCloth};
 use limb_pose::LimbPose;
 use repair::{finish_seams, gaps, repair, turn_outward};
 use search::{Search, SearchBody};
@@ -151,7 +151,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         None => {
             let cloth = SourceCloth { positions: &placed, faces: &sheet.faces, category: settings.category };
             let straight = SameModel::posed(body, LimbPose::of(body, &placement))
-                .and_then(|posed| posed.carry(&cloth, body, POSE_ROUNDS));
+                .and_then(|posed| posed.carry(&cloth, body, POSE_BINDINGS));
             (straight.map_err(FitError::Mesh)?, None)
         }
     };

@@ -11,7 +11,7 @@ pub(super) const NEAR_TIE: f64 = 6.0;
 /// Largest share of a garment that may lie inside the body where it is worn.
 pub(super) const MOST_INSIDE: f64 = 0.25;
 /// Candidates that are looked at, the best first.
-const READ: usize = 8;
+const MOST_READ: usize = 8;
 /// A garment touches the body: a twentieth of it is nearer than this (m).
 const TOUCHING_DISTANCE: f64 = 0.08;
 /// A garment hangs from a rim that is no farther from the body than this, on average (m).
@@ -76,7 +76,7 @@ pub(super) struct Readings {
 impl Readings {
     pub fn new(candidates: &[Candidate], search: &Search, cloth: &Cloth) -> Self {
         let mut found = Self { believed: Vec::new(), refused: Vec::new(), is_near: false };
-        for candidate in candidates.iter().take(READ) {
+        for candidate in candidates.iter().take(MOST_READ) {
             // What is far worse than one that is believed is not looked at.
             if found.believed.first().is_some_and(|best| candidate.score < best.score - NEAR_TIE) {
                 break;

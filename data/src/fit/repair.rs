@@ -3,7 +3,7 @@
 
 use super::error::FitError;
 use super::report::{Elements, MeshPiece, RepairKind, SeamReport};
-use super::settings::{FitSettings, Keep, MAX_VERTICES, MIN_TRIANGLES};
+use super::settings::{FitSettings, Keep, MAX_GARMENT_VERTICES, MIN_TRIANGLES};
 use super::sheet::{Corner, RepairSheet};
 use crate::format::PolygonMesh;
 use crate::mesh::{
@@ -74,7 +74,7 @@ fn manifold(file: &PolygonMesh) -> Result<RepairSheet, FitError> {
         return Err(FitError::TooFewTriangles { triangles: 0 });
     }
     let welded = weld(&used_positions, WELD_SHARE * diagonal);
-    if welded.positions.len() > MAX_VERTICES {
+    if welded.positions.len() > MAX_GARMENT_VERTICES {
         return Err(FitError::TooManyVertices { vertices: welded.positions.len() });
     }
     let mut compact = vec![u32::MAX; file.positions.len()];

@@ -99,15 +99,19 @@ impl Elements {
 
 impl fmt::Display for Elements {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const SHOWN: usize = 8;
+        const SHOWN_ELEMENTS: usize = 8;
         let (what, shown): (_, Vec<String>) = match self {
-            Self::Vertices(list) => ("vertex", list.iter().take(SHOWN).map(u32::to_string).collect()),
-            Self::Faces(list) => ("face", list.iter().take(SHOWN).map(u32::to_string).collect()),
-            Self::Edges(list) => ("edge", list.iter().take(SHOWN).map(|[a, b]| format!("{a}–{b}")).collect()),
+            Self::Vertices(list) => {
+                ("vertex", list.iter().take(SHOWN_ELEMENTS).map(u32::to_string).collect())
+            }
+            Self::Faces(list) => ("face", list.iter().take(SHOWN_ELEMENTS).map(u32::to_string).collect()),
+            Self::Edges(list) => {
+                ("edge", list.iter().take(SHOWN_ELEMENTS).map(|[a, b]| format!("{a}–{b}")).collect())
+            }
         };
         write!(f, "{what} {}", shown.join(", "))?;
         match self.len() {
-            n if n > SHOWN => write!(f, " and {} more", n - SHOWN),
+            n if n > SHOWN_ELEMENTS => write!(f, " and {} more", n - SHOWN_ELEMENTS),
             _ => Ok(()),
         }
     }

@@ -34,13 +34,13 @@ const PLAUSIBLE_EXTENT: [f64; 2] = [0.1, 1.2];
 /// Starts of one scale and turn that are kept by the blunt likelihood, from rims, and of them for the climb.
 const ROUGH_STARTS: usize = 60;
 const FROM_RIMS: usize = 6;
-const CLIMBED: usize = 10;
+const MOST_CLIMBED: usize = 10;
 /// Candidates that are judged by everything.
-const JUDGED: usize = 12;
+const MOST_JUDGED: usize = 12;
 /// Angle of each leg (degrees) for whose weights a body is made.
-const LEGS_APART: f64 = 6.0;
+const SPREAD_LEGS: f64 = 6.0;
 /// How far up and down the height of a placement is doubted (m): a garment is back within 2 cm.
-const PROBE: f64 = 0.025;
+const PROBE_HEIGHT: f64 = 0.025;
 
 /// What is measured on a body once, for all garments.
 pub(super) struct SearchBody {
@@ -65,7 +65,7 @@ impl SearchBody {
         let surface = Surface::new(body.template.clone(), body.faces.clone());
         let reach = body.zero_body().extent();
         let (field, skeleton) = (BodyField::new(body), BodySkeleton::new(body));
-        let placement = Placement { leg_angle_degrees: LEGS_APART, ..Placement::AS_GIVEN };
+        let placement = Placement { leg_angle_degrees: SPREAD_LEGS, ..Placement::AS_GIVEN };
         let apart = field.posed(&LimbPose::of(body, &placement), body);
         Ok(Self { field, skeleton, surface, apart, reach })
     }
@@ -147,7 +147,7 @@ impl<'a> Search<'a> {
             bases.par_iter().flat_map_iter(|base| self.climbed_from(base, &judge)).collect();
         sort(&mut found);
         let mut best = distinct(found);
-        best.truncate(JUDGED);
+        best.truncate(MOST_JUDGED);
         let steps = ClimbSteps { from: 0.01, to: 0.0005, is_sharp: true, is_fine: true, moves: Moves::All };
         let mut last: Vec<Candidate> = best
             .par_iter()
@@ -174,7 +174,7 @@ impl<'a> Search<'a> {
             let rough = judge.with_openings(climbed(judge, &c, &roughly));
             judge.with_openings(climbed(judge, &rough, &sharply))
         };
-        distinct(starts.filter(|c| c.is_worn).collect()).into_iter().take(CLIMBED).map(climb).collect()
+        distinct(starts.filter(|c| c.is_worn).collect()).into_iter().take(MOST_CLIMBED).map(climb).collect()
     }
 
     /// The middle of the garment in front of, at and behind the middle of the trunk, its top at every height, with every angle of
@@ -239,7 +239,7 @@ impl<'a> Search<'a> {
                 let steps = ClimbSteps { from: 0.02, to: 0.001, is_sharp: true, is_fine: true, moves };
                 judge.judged(climbed(&judge, &moved, &steps).placement)
             };
-            let (below, above) = rayon::join(|| at(-PROBE), || at(PROBE));
+            let (below, above) = rayon::join(|| at(-PROBE_HEIGHT), || at(PROBE_HEIGHT));
             if below.score > above.score { below } else { above }
         };
         let start = judge.judged(candidate.placement);

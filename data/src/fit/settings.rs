@@ -7,7 +7,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 /// Most vertices a garment may have after welding.
-pub const MAX_VERTICES: usize = 1_000_000;
+pub const MAX_GARMENT_VERTICES: usize = 1_000_000;
 
 /// What is left longer than this many times its length by the push out of the body is stretched.
 pub(super) const MOST_STRETCH: f64 = 1.5;

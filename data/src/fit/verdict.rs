@@ -14,7 +14,7 @@ use clothcombo_physics::vec3::{norm, sub};
 /// What lies on a part of the body is no farther from it, on average (m).
 const SNUG: f64 = 0.03;
 /// Readings nearer to each other than this are the same (m).
-const SAME: f64 = 0.02;
+const SAME_READING: f64 = 0.02;
 /// Limbs that are held otherwise explain that much more (log-posterior), or are doubted.
 const LIMB_EVIDENCE: f64 = 12.0;
 
@@ -96,7 +96,8 @@ pub(super) fn verdict(
         // Sleeves are a small part of a garment.
         apart.get(apart.len() * 19 / 20).copied().unwrap_or(0.0)
     };
-    let other = believed.iter().skip(1).map(|c| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME);
+    let other =
+        believed.iter().skip(1).map(|c| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME_READING);
     if let Some((other, apart)) = other {
         doubts.push(format!(
             "another placement, up to {:.0} mm away, fits nearly as well: {}; {} settles it",
@@ -157,7 +158,7 @@ fn differences(taken: &Placement, other: &Placement) -> Vec<String> {
     let flags: Vec<String> =
         flags.into_iter().filter_map(|(differs, flag)| differs.then_some(flag)).collect();
     match flags.is_empty() {
-        true if norm(sub(taken.translation, other.translation)) < SAME => {
+        true if norm(sub(taken.translation, other.translation)) < SAME_READING => {
             vec!["--from-body with the body it was made on".into()]
         }
         true => vec![offset_flag(taken)],

@@ -16,7 +16,7 @@ const SHAPE_REACH: f64 = 0.08;
 /// Weight of small shape numbers against a distance of 1 cm of all samples.
 const SMALL_SHAPE: f64 = 0.02;
 /// Share of the samples that have a say.
-const NEAREST_SHARE: f64 = 0.85;
+const SHAPE_SHARE: f64 = 0.85;
 
 impl LimbPose {
     /// The shape in the same pose that lies closest to `mesh`, which `motion` brings here, and the motion that goes
@@ -60,7 +60,7 @@ impl LimbPose {
             })
             .collect();
         planes.sort_by(|a, b| a.3.abs().total_cmp(&b.3.abs()));
-        planes.truncate((NEAREST_SHARE * planes.len() as f64) as usize);
+        planes.truncate((SHAPE_SHARE * planes.len() as f64) as usize);
         let mut equations = NormalEquations::new(k + 6);
         for (sample, normal, position, _) in &planes {
             let of_shape = directions.iter().map(|d| dot(*normal, d[*sample]));

@@ -7,9 +7,9 @@ use clothcombo_physics::vec3::{add_scaled, norm, scale};
 use rayon::prelude::*;
 
 /// Cloth within this distance of the skin (m) follows it wholly …
-const FOLLOWING: f64 = 0.03;
+const FOLLOWING_DISTANCE: f64 = 0.03;
 /// … and from this one on only its neighbours.
-const FREE: f64 = 0.08;
+const FREE_DISTANCE: f64 = 0.08;
 /// Rounds of correction.
 const RESTORE_ROUNDS: usize = 5;
 /// Averaging steps per round.
@@ -19,7 +19,7 @@ const LONGEST_CORRECTION: f64 = 0.05;
 
 /// How much a vertex at this distance follows the skin, 0–1.
 fn weight(gap: f64) -> f64 {
-    ((FREE - gap.abs()) / (FREE - FOLLOWING)).clamp(0.0, 1.0)
+    ((FREE_DISTANCE - gap.abs()) / (FREE_DISTANCE - FOLLOWING_DISTANCE)).clamp(0.0, 1.0)
 }
 
 /// Moves the vertices so that their signed distances to `target` (m) are `gaps` where these are small, smoothly over the garment.

@@ -7,7 +7,7 @@ use clothcombo_physics::vec3::{add, cross, dot, scale, sub};
 use rayon::prelude::*;
 
 /// Share of the points that have a say; what two people do not share, hair and shoes, is left out.
-const NEAREST_SHARE: f64 = 0.8;
+const ICP_SHARE: f64 = 0.8;
 /// Closest points farther away (m) are on another part of the body.
 const ICP_REACH: f64 = 0.15;
 /// The scale stays within this factor of where it began.
@@ -79,7 +79,7 @@ fn step(
         })
         .collect();
     pairs.sort_by(|a, b| a.2.abs().total_cmp(&b.2.abs()));
-    pairs.truncate((NEAREST_SHARE * pairs.len() as f64) as usize);
+    pairs.truncate((ICP_SHARE * pairs.len() as f64) as usize);
     let count = pairs.len() as f64;
     if pairs.len() < 50 {
         return None;

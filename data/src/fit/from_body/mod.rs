@@ -23,7 +23,7 @@ mod stance;
 mod tests;
 
 pub(super) use binding::SourceCloth;
-pub(super) use same_model::{POSE_ROUNDS, SameModel};
+pub(super) use same_model::{POSE_BINDINGS, SameModel};
 pub use source::SourceBody;
 
 use super::error::FitError;
@@ -38,7 +38,7 @@ use clothcombo_physics::vec3::{norm, scale, sub};
 use gaps::{apart_mm, median, restore};
 use icp::Similarity;
 use registration::{RegisteredMesh, register};
-use same_model::{RecoveredMesh, SHAPE_ROUNDS, has_topology, recovered};
+use same_model::{RecoveredMesh, SHAPE_BINDINGS, has_topology, recovered};
 use serde::Serialize;
 use source::{SourceKind, SourceMesh, SourceModel};
 
@@ -271,7 +271,7 @@ impl Aligned {
         }
         let rest = |positions: &[[f64; 3]]| {
             let cloth = SourceCloth { positions, faces, category };
-            self.model.carry(&cloth, body, SHAPE_ROUNDS).map_err(FitError::Mesh)
+            self.model.carry(&cloth, body, SHAPE_BINDINGS).map_err(FitError::Mesh)
         };
         let restored = |mut positions: Vec<[f64; 3]>| {
             let gaps: Vec<f64> = gaps.iter().map(|gap| self.report.scale * gap).collect();

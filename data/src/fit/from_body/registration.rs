@@ -25,7 +25,7 @@ const MOST_LIMB_STEPS: usize = 4;
 /// How far arms hang down and legs are spread (degrees).
 const LIMB_RANGES: [[f64; 2]; 2] = [[0.0, 85.0], [-5.0, 30.0]];
 /// Rounds in which the shape is found.
-const SHAPE_ROUNDS: usize = 8;
+const CLOSEST_SHAPE_ROUNDS: usize = 8;
 /// Surfaces farther apart than this (median, mm) are no two bodies in one pose.
 const FARTHEST_MM: f64 = 25.0;
 /// Mean distance (m) from which on no refinement helps, and no stance is better than another.
@@ -199,7 +199,7 @@ impl Registration<'_> {
     fn reshaped(&self, trial: Trial) -> Result<Trial, String> {
         let Trial { stance, mut model, mut motion, .. } = trial;
         let placed = Surface::new(stance.placement.apply(self.mesh.positions()), self.mesh.faces().into());
-        for _ in 0..SHAPE_ROUNDS {
+        for _ in 0..CLOSEST_SHAPE_ROUNDS {
             let Some((shape, moved)) = model.closer_shape(self.body, &placed, &motion)? else { break };
             (model, motion) = (LimbPose::new(self.body, &shape, model.angles)?, moved);
         }

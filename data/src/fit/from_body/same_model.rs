@@ -11,18 +11,18 @@ use crate::fit::settings::FitSettings;
 use clothcombo_physics::vec3::{norm, scale, sub};
 
 /// Rounds of binding, which depends on where the garment ends up: for a pose alone, and for a pose and a shape.
-pub(in crate::fit) const POSE_ROUNDS: usize = 3;
-pub(in crate::fit) const SHAPE_ROUNDS: usize = 4;
+pub(in crate::fit) const POSE_BINDINGS: usize = 3;
+pub(in crate::fit) const SHAPE_BINDINGS: usize = 4;
 
 /// A body of the target's vertices in some shape and pose.
 pub(in crate::fit) struct SameModel {
     /// Vertices in T-pose (m), pelvis at the origin.
     shaped: Vec<[f64; 3]>,
-    posed: Option<PosedVertices>,
+    posed: Option<SkinnedShape>,
 }
 
 /// Where `bones` carry the shaped vertices (m).
-struct PosedVertices {
+struct SkinnedShape {
     positions: Vec<[f64; 3]>,
     bones: Vec<[[f64; 4]; 3]>,
 }
@@ -50,7 +50,7 @@ impl SameModel {
     pub fn posed(body: &Body, pose: LimbPose) -> Result<Self, String> {
         let shaped = body.shaped(&pose.shape).map_err(|e| e.to_string())?.positions;
         let LimbPose { positions, bones, .. } = pose;
-        Ok(Self { shaped, posed: Some(PosedVertices { positions, bones }) })
+        Ok(Self { shaped, posed: Some(SkinnedShape { positions, bones }) })
     }
 
     /// Its vertices (m).
@@ -75,7 +75,7 @@ impl SameModel {
         for round in 0..rounds {
             let binding = cloth.bound(rest, if round == 0 { &on_source } else { &at_rest }, body)?;
             let mut shaped = cloth.positions.to_vec();
-            if let Some(PosedVertices { bones, .. }) = &self.posed {
+            if let Some(SkinnedShape { bones, .. }) = &self.posed {
                 let rows = binding.skin_weights.chunks_exact(bones.len());
                 for (p, row) in shaped.iter_mut().zip(rows) {
                     let weighted = bones.iter().zip(row).map(|(bone, w)| (bone, f64::from(*w)));
@@ -117,7 +117,7 @@ pub(super) fn recovered(mesh: &SourceMesh, body: &Body, settings: &FitSettings) 
             unskin(positions[v], weighted.map(|(j, w)| (&bones[usize::from(*j)], f64::from(*w))))
         })
         .collect::<Option<Vec<_>>>()?;
-    let model = SameModel { shaped, posed: Some(PosedVertices { positions, bones }) };
+    let model = SameModel { shaped, posed: Some(SkinnedShape { positions, bones }) };
     Some(RecoveredMesh { placement, shape: found.shape, model, residual_mm: 1e3 * found.mean_distance })
 }
 
