@@ -87,29 +87,11 @@ pub(super) fn verdict(
     {
         return Err(FitError::OffTrunk { place });
     }
-    let taken = candidate.placement;
-    let points = search.level(cloth, &taken);
-    let apart = |other: &Placement| {
-        let other = search.level(cloth, other);
-        let mut apart: Vec<f64> = other.iter().zip(&points).map(|(a, b)| norm(sub(*a, *b))).collect();
-        apart.sort_by(f64::total_cmp);
-        // Sleeves are a small part of a garment.
-        apart.get(apart.len() * 19 / 20).copied().unwrap_or(0.0)
-    };
-    let other =
-        believed.iter().skip(1).map(|c| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME_READING);
-    if let Some((other, apart)) = other {
-        doubts.push(format!(
-            "another placement, up to {:.0} mm away, fits nearly as well: {}; {} settles it",
-            1e3 * apart,
-            other.reading(),
-            differences(&taken, &other).join(" ")
-        ));
-    }
+    doubts.extend(near_tie(&candidate, &believed, search, cloth));
     if least_loss < NEAR_TIE {
         doubts.push(format!(
             "its height is known to 3 cm only: look at it; {} takes it, another y moves it",
-            offset_flag(&taken)
+            offset_flag(&candidate.placement)
         ));
     }
     if candidate.is_tube && settings.category.is_none() && !is_usual {
@@ -118,11 +100,40 @@ pub(super) fn verdict(
                 .into(),
         );
     }
-    doubts.extend(outfit_warning(candidate.worn_pieces));
-    if candidate.piercing.arms > 0 {
+    doubts.extend(worn_otherwise(&candidate, candidates, settings));
+    Ok(PlacementVerdict { placement: candidate.placement, doubts, is_odd: believed.is_empty() })
+}
+
+/// Another reading that is nearly as good as the one taken.
+fn near_tie(taken: &Candidate, believed: &[Candidate], search: &Search, cloth: &Cloth) -> Option<String> {
+    let taken = taken.placement;
+    let points = search.level(cloth, &taken);
+    let apart = |other: &Placement| {
+        let other = search.level(cloth, other);
+        let mut apart: Vec<f64> = other.iter().zip(&points).map(|(a, b)| norm(sub(*a, *b))).collect();
+        apart.sort_by(f64::total_cmp);
+        // Sleeves are a small part of a garment.
+        apart.get(apart.len() * 19 / 20).copied().unwrap_or(0.0)
+    };
+    let mut others = believed.iter().skip(1).map(|c| (c.placement, apart(&c.placement)));
+    others.find(|(_, apart)| *apart > SAME_READING).map(|(other, apart)| {
+        format!(
+            "another placement, up to {:.0} mm away, fits nearly as well: {}; {} settles it",
+            1e3 * apart,
+            other.reading(),
+            differences(&taken, &other).join(" ")
+        )
+    })
+}
+
+/// What is not certain about how a candidate is worn: by itself, by these arms, this way round, with limbs held so.
+fn worn_otherwise(taken: &Candidate, candidates: &[Candidate], settings: &FitSettings) -> Vec<String> {
+    let mut doubts: Vec<String> = outfit_warning(taken.worn_pieces).into_iter().collect();
+    let placement = &taken.placement;
+    if taken.piercing.arms > 0 {
         doubts.push(ARMS_MISS.into());
     }
-    if taken.turn_degrees == 180.0 && settings.turn_degrees.is_none() && candidate.neck_drop.is_none() {
+    if placement.turn_degrees == 180.0 && settings.turn_degrees.is_none() && taken.neck_drop.is_none() {
         doubts.push(
             "turned by 180°, as it lies better on the body so, though no neckline shows where its front is; --turn 0 keeps it"
                 .into(),
@@ -130,18 +141,18 @@ pub(super) fn verdict(
     }
     // Those that are hinted at are alike in all candidates.
     let held = |c: &Candidate| (c.placement.arm_angle_degrees != 0.0, c.placement.leg_angle_degrees != 0.0);
-    let otherwise = candidates.iter().find(|c| held(c) != held(&candidate));
-    let margin = otherwise.map_or(f64::MAX, |other| candidate.score - other.score);
-    if !taken.has_limbs_at_rest() && margin < LIMB_EVIDENCE {
-        let (limbs, flag, angle) = match taken.arm_angle_degrees {
-            0.0 => ("legs", "--legs 0", taken.leg_angle_degrees),
+    let otherwise = candidates.iter().find(|c| held(c) != held(taken));
+    let margin = otherwise.map_or(f64::MAX, |other| taken.score - other.score);
+    if !placement.has_limbs_at_rest() && margin < LIMB_EVIDENCE {
+        let (limbs, flag, angle) = match placement.arm_angle_degrees {
+            0.0 => ("legs", "--legs 0", placement.leg_angle_degrees),
             angle => ("arms", "--arms t", angle),
         };
         doubts.push(format!(
             "little tells that its {limbs} are {angle:.0}° from the rest pose (log-odds {margin:.1}); {flag} if they are not"
         ));
     }
-    Ok(PlacementVerdict { placement: taken, doubts, is_odd: believed.is_empty() })
+    doubts
 }
 
 /// Flags by which the placement taken differs from another, as they fix the one taken.
