@@ -56,17 +56,13 @@ pub(crate) fn is_double(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> bool {
 }
 
 fn manifold(file: &PolygonMesh) -> Result<RepairSheet, FitError> {
-    let mut cut = triangulate(&file.positions, file.polygons());
+    let cut = triangulate(&file.positions, file.polygons());
     let far = far_vertices(&file.positions, &cut.faces);
-    let stays: Vec<bool> =
-        cut.faces.iter().map(|f| f.iter().all(|v| far.binary_search(v).is_err())).collect();
-    let of_stays = || stays.iter().copied();
-    cut.faces = kept(cut.faces, of_stays());
-    cut.corners = kept(cut.corners, of_stays());
-    cut.polygon = kept(cut.polygon, of_stays());
+    let is_near = |v: &u32| far.binary_search(v).is_err();
+    let stays: Vec<usize> = (0..cut.faces.len()).filter(|f| cut.faces[*f].iter().all(is_near)).collect();
     let mut used = vec![false; file.positions.len()];
-    let of_faces = cut.faces.iter().flatten().chain(file.polygons().flatten());
-    of_faces.filter(|v| far.binary_search(v).is_err()).for_each(|v| used[*v as usize] = true);
+    let of_faces = stays.iter().flat_map(|f| &cut.faces[*f]).chain(file.polygons().flatten());
+    of_faces.filter(|v| is_near(v)).for_each(|v| used[*v as usize] = true);
     let used_vertices: Vec<u32> = (0..used.len() as u32).filter(|v| used[*v as usize]).collect();
     let used_positions: Vec<[f64; 3]> = used_vertices.iter().map(|v| file.positions[*v as usize]).collect();
     let diagonal = diagonal(&used_positions);
@@ -80,14 +76,16 @@ fn manifold(file: &PolygonMesh) -> Result<RepairSheet, FitError> {
     let mut compact = vec![u32::MAX; file.positions.len()];
     used_vertices.iter().zip(&welded.number).for_each(|(v, w)| compact[*v as usize] = *w);
 
-    let renumbered: Vec<[u32; 3]> = cut.faces.iter().map(|f| f.map(|v| compact[v as usize])).collect();
+    let renumbered: Vec<[u32; 3]> =
+        stays.iter().map(|f| cut.faces[*f].map(|v| compact[v as usize])).collect();
     let clean = clean_faces(&welded.positions, &renumbered, AREA_SHARE * diagonal * diagonal);
     if clean.kept.len() < MIN_TRIANGLES {
         return Err(FitError::TooFewTriangles { triangles: clean.kept.len() });
     }
     let faces: Vec<[u32; 3]> = clean.kept.iter().map(|f| renumbered[*f as usize]).collect();
-    let corners = clean.kept.iter().map(|f| cut.corners[*f as usize].map(Corner::own)).collect();
-    let face_origin = clean.kept.iter().map(|f| cut.polygon[*f as usize]).collect();
+    let corners = clean.kept.iter().map(|f| cut.corners[stays[*f as usize]].map(Corner::own)).collect();
+    let of_polygons = |list: &[u32]| list.iter().map(|f| cut.polygon[stays[*f as usize]]).collect();
+    let face_origin = of_polygons(&clean.kept);
     let turned = vec![false; faces.len()];
     let positions = welded.positions;
     let mut sheet = RepairSheet {
@@ -105,8 +103,7 @@ fn manifold(file: &PolygonMesh) -> Result<RepairSheet, FitError> {
     let mut kept = vec![0u8; welded.origin.len()];
     made.origin.iter().for_each(|w| kept[*w as usize] = kept[*w as usize].saturating_add(1));
     let of_file = |e: &[u32; 2]| e.map(file_vertex);
-    let is_unused = |v: &u32| !used[*v as usize] && far.binary_search(v).is_err();
-    let unused = (0..used.len() as u32).filter(is_unused);
+    let unused = (0..used.len() as u32).filter(|v| !used[*v as usize] && is_near(v));
     let lost = (0..kept.len() as u32).filter(|w| kept[*w as usize] == 0).map(file_vertex);
     sheet.note(RepairKind::DroppedFarVertices, Elements::Vertices(far.clone()));
     sheet.note(RepairKind::DroppedIsolatedVertices, Elements::Vertices(unused.chain(lost).collect()));
@@ -114,9 +111,8 @@ fn manifold(file: &PolygonMesh) -> Result<RepairSheet, FitError> {
     sheet.note(RepairKind::WeldedVertices, Elements::Vertices(merged));
     let large = file.polygons().enumerate().filter(|(_, p)| p.len() > 3).map(|(i, _)| i as u32).collect();
     sheet.note(RepairKind::TriangulatedFaces, Elements::Faces(large));
-    let polygons = |list: &[u32]| Elements::Faces(list.iter().map(|f| cut.polygon[*f as usize]).collect());
-    sheet.note(RepairKind::DroppedDegenerateFaces, polygons(&clean.degenerate));
-    sheet.note(RepairKind::DroppedRepeatedFaces, polygons(&clean.repeated));
+    sheet.note(RepairKind::DroppedDegenerateFaces, Elements::Faces(of_polygons(&clean.degenerate)));
+    sheet.note(RepairKind::DroppedRepeatedFaces, Elements::Faces(of_polygons(&clean.repeated)));
     let edges = |list: &[[u32; 2]]| Elements::Edges(list.iter().map(of_file).collect());
     sheet.note(RepairKind::CutNonManifoldEdges, edges(&made.crowded));
     sheet.note(RepairKind::CutOneSidedEdges, edges(&made.twisted));
@@ -127,10 +123,6 @@ fn manifold(file: &PolygonMesh) -> Result<RepairSheet, FitError> {
     sheet.note(RepairKind::SplitVertices, Elements::Vertices(touching.map(file_vertex).collect()));
     sheet.number_as_file(file);
     Ok(sheet)
-}
-
-fn kept<T>(all: Vec<T>, stays: impl Iterator<Item = bool>) -> Vec<T> {
-    all.into_iter().zip(stays).filter_map(|(x, stays)| stays.then_some(x)).collect()
 }
 
 /// Vertices that no edge joins to the rest within [`FAR_EDGES`] median edges, ascending: slips of a modelling program. Where there are
@@ -201,9 +193,10 @@ fn keep_outer(sheet: &mut RepairSheet, file: &PolygonMesh) -> Result<(), FitErro
     let outer = outer_sheet(&sheet.positions, &faces);
     let mut is_outer = vec![false; faces.len()];
     outer.iter().for_each(|f| is_outer[*f as usize] = true);
-    let area = |list: &mut dyn Iterator<Item = usize>| list.map(|f| sheet.area(f)).sum::<f64>();
-    let all = area(&mut (0..faces.len()));
-    let kept = area(&mut (0..faces.len()).filter(|f| is_outer[*f]));
+    let areas: Vec<f64> = (0..faces.len()).map(|f| sheet.area(f)).collect();
+    let all: f64 = areas.iter().sum();
+    let kept: f64 =
+        areas.iter().zip(&is_outer).filter(|(_, is_outer)| **is_outer).map(|(area, _)| area).sum();
     if !(OUTER_SHARE[0] * all..=OUTER_SHARE[1] * all).contains(&kept) {
         return Err(FitError::MixedSheets);
     }
