@@ -69,9 +69,9 @@ impl Candidate {
 }
 
 /// Judges placements of one garment on one body.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Judge<'a> {
-    pub field: &'a BodyField,
+    pub field: BodyField,
     pub skeleton: &'a BodySkeleton,
     pub cloth: &'a Cloth<'a>,
     pub settings: &'a FitSettings,

@@ -117,7 +117,7 @@ impl<'a> Search<'a> {
 
     /// The judge of a garment.
     pub fn judge<'b>(&'b self, cloth: &'b Cloth, settings: &'b FitSettings) -> Judge<'b> {
-        Judge { field: &self.measured.field, skeleton: &self.measured.skeleton, cloth, settings }
+        Judge { field: self.measured.field.clone(), skeleton: &self.measured.skeleton, cloth, settings }
     }
 
     /// Distinct candidates, the best first.
@@ -131,11 +131,9 @@ impl<'a> Search<'a> {
     }
 
     fn found(&self, cloth: &Cloth, settings: &FitSettings, is_posed: bool) -> Vec<Candidate> {
-        let judge = self.judge(cloth, settings);
         let leg_angle_degrees = settings.legs_degrees.unwrap_or(0.0);
         let straight = Placement { leg_angle_degrees, ..Placement::AS_GIVEN };
-        let posed = self.posed_field(&straight);
-        let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..judge };
+        let judge = self.posed_judge(&self.judge(cloth, settings), &straight);
         let mut bases = Vec::new();
         for unit in self.plausible_units(cloth, settings) {
             for up in settings.ups() {
@@ -229,9 +227,7 @@ impl<'a> Search<'a> {
     /// The best placement around a candidate, and how much worse (log-posterior) the better one of those a probe's height above
     /// and below it is, when everything but the height is found anew.
     pub fn probed(&self, cloth: &Cloth, settings: &FitSettings, candidate: Candidate) -> (Candidate, f64) {
-        let judge = self.judge(cloth, settings);
-        let posed = self.posed_field(&candidate.placement);
-        let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..judge };
+        let judge = self.posed_judge(&self.judge(cloth, settings), &candidate.placement);
         let around = |best: &Candidate, moves: Moves| -> Candidate {
             let at = |dy: f64| {
                 let mut moved = *best;

@@ -1,7 +1,6 @@
 //! Candidates whose arms hang or whose legs stand apart: judged on bodies posed like them.
 
 use super::{Search, distinct, sort};
-use crate::fit::body_field::BodyField;
 use crate::fit::climb::{ClimbSteps, Moves, climbed};
 use crate::fit::cloth::Cloth;
 use crate::fit::judge::{Candidate, Judge};
@@ -52,7 +51,7 @@ impl Search<'_> {
             return;
         }
         let at = |c: &Candidate, degrees: f64| Placement { leg_angle_degrees: degrees, ..c.placement };
-        let apart = Judge { field: &self.measured.apart, ..*judge };
+        let apart = Judge { field: self.measured.apart.clone(), ..judge.clone() };
         let has_legs = |c: &&Candidate| LEG_ANGLES.iter().any(|degrees| apart.limbs(&at(c, *degrees)).legs);
         let spread = |candidate: &Candidate| {
             let turned = apart.turned(&candidate.placement, None, true);
@@ -72,18 +71,19 @@ impl Search<'_> {
 
     /// The best near a candidate on a body in its pose.
     fn climbed_posed(&self, judge: &Judge, candidate: &Candidate) -> Candidate {
-        let is_posed = judge.field.is_posed(&candidate.placement);
-        let posed = if is_posed { None } else { self.posed_field(&candidate.placement) };
-        let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..*judge };
+        let judge = self.posed_judge(judge, &candidate.placement);
         let moves =
             if candidate.placement.origin == FileOrigin::Elsewhere { Moves::All } else { Moves::Limbs };
         let steps = ClimbSteps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true, moves };
         judge.judged(climbed(&judge, candidate, &steps).placement)
     }
 
-    /// The body in a garment's pose; none at rest.
-    pub(super) fn posed_field(&self, placement: &Placement) -> Option<BodyField> {
-        let is_posed = !placement.has_limbs_at_rest();
-        is_posed.then(|| self.measured.field.posed(&LimbPose::of(self.body, placement), self.body))
+    /// The same judge on a body whose limbs are held as a garment's.
+    pub(super) fn posed_judge<'b>(&self, judge: &Judge<'b>, placement: &Placement) -> Judge<'b> {
+        if placement.has_limbs_at_rest() || judge.field.is_posed(placement) {
+            return judge.clone();
+        }
+        let field = self.measured.field.posed(&LimbPose::of(self.body, placement), self.body);
+        Judge { field, ..judge.clone() }
     }
 }
