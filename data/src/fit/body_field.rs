@@ -113,6 +113,7 @@ impl BodyField {
         let arm = |side: usize, faces: &[[u32; 3]]| {
             let shoulder = body.joint_place(LIMB_ROOTS[0][side]).filter(|_| !faces.is_empty())?;
             let (distance, radius) = distance(faces);
+            // The deltoid lies within the cut.
             Some(Arm { side: [1.0, -1.0][side], shoulder, radius: 0.9 * radius, distance })
         };
         let (trunk, (left, right)) =

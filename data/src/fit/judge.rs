@@ -7,7 +7,7 @@
 use super::anatomy::{BodySkeleton, PiercingBones};
 use super::body_field::{BodyField, LimbTurn};
 use super::cloth::Cloth;
-use super::likelihood::{log_likelihood, rough_log_likelihood};
+use super::likelihood::{log_likelihood, normal_density, rough_log_likelihood};
 use super::placement::Placement;
 use super::settings::FitSettings;
 use crate::asset::Category;
@@ -132,17 +132,16 @@ impl Judge<'_> {
         /// Density anywhere else, and anywhere on hips or chest (1/m).
         const ELSEWHERE: f64 = 0.02;
         const UNIFORM: f64 = 5.0;
-        let normal = |middle: f64, spread: f64| {
-            (-0.5 * ((height - middle) / spread).powi(2)).exp() / (spread * std::f64::consts::TAU.sqrt())
-        };
         let shares = match self.settings.category {
             None => RIM_SHARES,
             Some(Category::Skirt | Category::Trousers) => [1.0, 0.0],
             Some(_) => [0.0, 1.0],
         };
         let levels = self.field.levels;
-        let density =
-            shares[0] * normal(levels.waist - 0.03, 0.035) + shares[1] * normal(levels.armpit - 0.035, 0.03);
+        // Waistbands sit 3 cm below the waist, strapless tops 3.5 cm below the armpits, give or take as much.
+        let waistband = normal_density(height, levels.waist - 0.03, 0.035);
+        let strapless = normal_density(height, levels.armpit - 0.035, 0.03);
+        let density = shares[0] * waistband + shares[1] * strapless;
         (density + ELSEWHERE).ln() - UNIFORM.ln()
     }
 

@@ -59,9 +59,14 @@ fn sharp_log_density(gap: f64, ease: f64, spread: f64) -> f64 {
     (MIXTURE[0] * lying + MIXTURE[1] * hanging + MIXTURE[2] * inside).max(1e-9).ln()
 }
 
-/// A wide bell around usual eases, and a tail on both sides.
+/// The normal distribution's density.
+pub(super) fn normal_density(x: f64, middle: f64, spread: f64) -> f64 {
+    (-0.5 * ((x - middle) / spread).powi(2)).exp() / (spread * std::f64::consts::TAU.sqrt())
+}
+
+/// A bell of 2 cm around the middle of the usual eases, and a tail on both sides.
 fn rough_log_density(gap: f64) -> f64 {
-    let lying = (-0.5 * ((gap - 0.012) / 0.02).powi(2)).exp() / (0.02 * std::f64::consts::TAU.sqrt());
+    let lying = normal_density(gap, 0.012, 0.02);
     let hanging = (-gap.max(0.0) / 0.1).exp() / 0.1;
     let inside = (gap.min(0.0) / 0.02).exp();
     (0.5 * lying + 0.5 * hanging * inside).max(1e-9).ln()

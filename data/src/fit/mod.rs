@@ -307,6 +307,7 @@ fn take_or_refuse(is_said: bool, error: FitError, doubts: &mut Vec<String>) -> R
     Ok(())
 }
 
+/// Refuses what reaches from the crown to the soles within 4 cm and to both hands within 10 cm.
 fn refuse_bodies(positions: &[[f64; 3]], body: &Body) -> Result<(), FitError> {
     let (low, high) = body.zero_body().bounds();
     let [lowest, highest] = bounds(positions);

@@ -29,13 +29,12 @@ const OUTER_SHARE: [f64; 2] = [0.3, 0.7];
 /// borders that coincide.
 pub(super) fn repair(file: &PolygonMesh, settings: &FitSettings) -> Result<RepairSheet, FitError> {
     let mut sheet = manifold(file)?;
+    if settings.keep == Keep::Largest {
+        keep_largest(&mut sheet, file);
+    }
     match settings.keep {
-        Keep::All => refuse_thickness(&sheet)?,
-        Keep::Largest => {
-            keep_largest(&mut sheet, file);
-            refuse_thickness(&sheet)?;
-        }
         Keep::Outer => keep_outer(&mut sheet, file)?,
+        Keep::All | Keep::Largest => refuse_thickness(&sheet)?,
     }
     if sheet.faces.len() < MIN_TRIANGLES {
         return Err(FitError::TooFewTriangles { triangles: sheet.faces.len() });
@@ -166,17 +165,13 @@ fn oriented(sheet: &mut RepairSheet) -> Oriented {
 }
 
 fn refuse_thickness(sheet: &RepairSheet) -> Result<(), FitError> {
-    match thickness(&sheet.positions, &sheet.outward_faces()) {
-        Some(thickness) => {
-            let share = thickness / diagonal(&sheet.positions);
-            Err(FitError::Thickness { thickness, share })
-        }
-        None => match sheets(&sheet.positions, &sheet.faces) {
-            Some(distance) => {
-                Err(FitError::Sheets { distance, share: distance / diagonal(&sheet.positions) })
-            }
-            None => Ok(()),
-        },
+    let share = |distance: f64| distance / diagonal(&sheet.positions);
+    if let Some(thickness) = thickness(&sheet.positions, &sheet.outward_faces()) {
+        return Err(FitError::Thickness { thickness, share: share(thickness) });
+    }
+    match sheets(&sheet.positions, &sheet.faces) {
+        Some(distance) => Err(FitError::Sheets { distance, share: share(distance) }),
+        None => Ok(()),
     }
 }
 

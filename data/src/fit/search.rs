@@ -256,14 +256,13 @@ fn best_of(mut candidates: Vec<Candidate>, count: usize) -> Vec<Candidate> {
     candidates
 }
 
-/// Without those close to a better one.
+/// Without those close to a better one: the same turn, within 2 cm, with arms within 8° or that change nothing.
 fn distinct(ranked: Vec<Candidate>) -> Vec<Candidate> {
     let mut kept: Vec<Candidate> = Vec::new();
     for c in ranked {
         let is_new = |better: &Candidate| {
             let (a, b) = (&better.placement, &c.placement);
             let turned = (a.unit, a.up, a.turn_degrees) != (b.unit, b.up, b.turn_degrees);
-            // Arms that change nothing are not seen.
             let arms =
                 (a.arm_angle_degrees - b.arm_angle_degrees).abs() > 8.0 && (better.fit - c.fit).abs() > 0.5;
             let legs = (a.leg_angle_degrees == 0.0) != (b.leg_angle_degrees == 0.0);

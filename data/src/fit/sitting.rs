@@ -50,6 +50,7 @@ impl Sitting {
 
     /// Whether cloth that is not known to be worn lies on the trunk all around.
     pub(super) fn is_snug(&self) -> bool {
+        // An eighth inside is a tight fit; six of eight directions leave an open front; a coat hangs 6 cm off on average.
         self.inside < 0.12 && self.wrap >= 0.75 && self.mean_distance < 0.06
     }
 }

@@ -81,6 +81,7 @@ fn step(
     pairs.sort_by(|a, b| a.2.abs().total_cmp(&b.2.abs()));
     pairs.truncate((ICP_SHARE * pairs.len() as f64) as usize);
     let count = pairs.len() as f64;
+    // Fewer do not tell how a body stands.
     if pairs.len() < 50 {
         return None;
     }

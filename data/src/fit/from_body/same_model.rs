@@ -153,6 +153,7 @@ fn axes(vertices: &[[f64; 3]], body: &Body, settings: &FitSettings) -> Option<Pl
         Some(unit) => unit,
         None => Unit::ALL.into_iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?,
     };
+    // People's trunks differ by less than a factor of 1.6.
     if misfit(&unit).is_nan() || misfit(&unit) > 0.5 {
         return None;
     }

@@ -73,6 +73,7 @@ fn measured(placement: Placement, points: &[[f64; 3]], body: &Body) -> Stance {
     let (x, z) = (of(0, &is_trunk), of(2, &is_trunk));
     // The sole is as long as the foot, the shin above it as deep as the heel.
     let (sole, shin) = (of(2, &|p| level(p) < 0.035), of(2, &|p| (0.08..0.16).contains(&level(p))));
+    // Fingers and palms are the last 4 % of the reach.
     let reach = points.iter().map(|p| (p[0] - x).abs()).fold(0.0, f64::max);
     let tip = of(1, &|p| (p[0] - x).abs() > 0.96 * reach);
     Stance {
