@@ -6,7 +6,7 @@ use crate::call::{call, refused, refused_text};
 use crate::drape::PyDrape;
 use clothcombo_data::asset::{KnownShape, Motion, Pose, Provenance};
 use clothcombo_data::fit::FitSettings;
-use clothcombo_data::fit::hints::GarmentEntry;
+use clothcombo_data::fit::hints::GarmentHints;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_trainer::inference::{
     Bodies, Draper, DraperSettings, FrameRange, GarmentCatalog, GivenGarment, MOST_RADIUS, Outfit,
@@ -86,7 +86,7 @@ pub type GarmentInput = (String, MeshInput, String);
 pub struct RequestedGarment {
     pub name: String,
     pub mesh: MeshInput,
-    pub entry: GarmentEntry,
+    pub entry: GarmentHints,
 }
 
 impl RequestedGarment {

@@ -25,6 +25,7 @@ pub use footprint::Footprint;
 pub use garment::{Garment, infeasible_pair};
 pub use garment_material::GarmentMaterial;
 pub use motion::Motion;
+pub(crate) use normal_equations::NormalEquations;
 pub use pose::Pose;
 pub use provenance::Provenance;
 pub use recover::{KnownShape, RecoveredBody, recover_body};

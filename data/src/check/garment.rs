@@ -4,13 +4,12 @@ use super::checked::CheckedFile;
 use super::placement::misplacement;
 use super::targets::ManifestHints;
 use crate::asset::{Body, Category, Garment};
-use crate::fit::{PlacementCheck, contact_warnings};
+use crate::fit::{PlacementCheck, contact_warnings, outfit_warning};
 use crate::format::load_tri_mesh;
-use crate::mesh::MeshMeasures;
+use crate::mesh::{MeshMeasures, gaps_to};
 use clothcombo_physics::Topology;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
-use clothcombo_physics::query::{Distance, Surface};
-use rayon::prelude::*;
+use clothcombo_physics::query::Surface;
 use serde::Serialize;
 use std::path::Path;
 
@@ -76,12 +75,7 @@ pub(super) fn check(
             path.display()
         ));
     }
-    let mut gaps: Vec<f64> = mesh
-        .positions()
-        .par_iter()
-        .with_min_len(256)
-        .map(|p| surface.gap(*p, Distance::ClosestPoint).gap)
-        .collect();
+    let mut gaps = gaps_to(mesh.positions(), surface);
     gaps.sort_by(f64::total_cmp);
     let median = gaps[gaps.len() / 2];
     let category = hints.category.unwrap_or_else(|| Category::guess(&mesh, body));
@@ -106,12 +100,7 @@ pub(super) fn check(
     };
     let misplaced = misplacement(&mesh, body, placement, &gaps);
     let mut warnings = warnings(&garment);
-    let pieces = placement.worn_pieces(&mesh, body);
-    if pieces > 1 {
-        warnings.push(format!(
-            "{pieces} of its pieces would be worn without the others: for an outfit, export one file per garment"
-        ));
-    }
+    warnings.extend(outfit_warning(placement.worn_pieces(&mesh, body)));
     if let Some(given) = hints.category {
         warnings.extend(placement.contradiction(&mesh, body, given));
     }

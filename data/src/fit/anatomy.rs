@@ -1,12 +1,12 @@
 //! Which parts of the body pass through the openings of a garment, and whether bones pass through its cloth.
 
 use super::body_field::LimbTurn;
-use super::limb_pose::LIMBS as TURNED;
+use super::limb_pose::LIMB_ROOTS;
 use crate::asset::Body;
 use clothcombo_physics::vec3::{add, cross, dot, scale, sub};
 
 /// The ends of the body, each with the joints on the way there from the pelvis.
-const LIMBS: [&[&str]; 5] = [
+const LIMB_CHAINS: [&[&str]; 5] = [
     &["pelvis", "spine1", "spine2", "spine3", "neck", "head"],
     &["pelvis", "spine1", "spine2", "spine3", "left_collar", "left_shoulder", "left_elbow", "left_wrist"],
     &["pelvis", "spine1", "spine2", "spine3", "right_collar", "right_shoulder", "right_elbow", "right_wrist"],
@@ -14,7 +14,7 @@ const LIMBS: [&[&str]; 5] = [
     &["pelvis", "right_hip", "right_knee", "right_ankle"],
 ];
 /// How far limbs are extended beyond their last joint (m).
-const BEYOND: f64 = 20.0;
+const BEYOND_LIMB: f64 = 20.0;
 
 /// What an opening of a garment goes around.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ pub(super) enum Opening {
 }
 
 /// The bones of the zero body, from the pelvis to the five ends.
-pub(super) struct Skeleton {
+pub(super) struct BodySkeleton {
     limbs: [Vec<[f64; 3]>; 5],
     /// Of left and right arm, left and right leg the joint that turns it.
     roots: [Option<[f64; 3]>; 4],
@@ -55,11 +55,11 @@ impl PiercingBones {
     }
 }
 
-impl Skeleton {
+impl BodySkeleton {
     pub fn new(body: &Body) -> Self {
         Self {
-            limbs: LIMBS.map(|names| names.iter().filter_map(|n| body.joint_place(n)).collect()),
-            roots: std::array::from_fn(|limb| body.joint_place(TURNED[limb / 2][limb % 2])),
+            limbs: LIMB_CHAINS.map(|names| names.iter().filter_map(|n| body.joint_place(n)).collect()),
+            roots: std::array::from_fn(|limb| body.joint_place(LIMB_ROOTS[limb / 2][limb % 2])),
         }
     }
 
@@ -76,7 +76,7 @@ impl Skeleton {
             let bones: Vec<Segment> = points.windows(2).map(|pair| [pair[0], pair[1]]).collect();
             let beyond = bones.last().map(|[a, b]| {
                 let along = sub(*b, *a);
-                [*b, add(*b, scale(along, BEYOND / dot(along, along).sqrt().max(1e-9)))]
+                [*b, add(*b, scale(along, BEYOND_LIMB / dot(along, along).sqrt().max(1e-9)))]
             });
             (bones, beyond)
         })

@@ -1,25 +1,23 @@
 //! Files as they stand: their origin lies at one of the usual points, or where it is said to be, and nothing is searched for.
 
-use super::climb::{Moves, Steps, climbed};
+use super::climb::{ClimbSteps, Moves, climbed};
 use super::cloth::Cloth;
 use super::judge::{Candidate, Judge, UNWORN};
-use super::placement::{Origin, Placement};
+use super::placement::{FileOrigin, Placement};
 use super::search::{ARM_ANGLES, Search};
 use super::settings::FitSettings;
-use super::verdict::implausibility;
-use crate::mesh::outwardness;
+use crate::mesh::{outward_area, triangle_normal};
+use clothcombo_physics::vec3::norm;
 use rayon::prelude::*;
 
 /// Least share of a sheet's area that faces one way.
-const SHEET: f64 = 0.5;
+const SHEET_SHARE: f64 = 0.5;
 
 impl Search<'_> {
     /// How a garment is judged that is in metres, T-pose and the body's frame; or why nobody wears it there.
     pub fn believed_as_given(&self, cloth: &Cloth, settings: &FitSettings) -> Result<Candidate, String> {
         let candidate = self.judged_as_given(&self.judge(cloth, settings), Placement::AS_GIVEN);
-        let (sitting, height) = self.measured(cloth, &Placement::AS_GIVEN);
-        implausibility(&candidate, &sitting, height, self.off_trunk(cloth, &Placement::AS_GIVEN))
-            .map_or(Ok(candidate), Err)
+        self.looked_at(cloth, &candidate).1.map_or(Ok(candidate), Err)
     }
 
     /// Files as they stand: their origin at one of the usual points, or where it is said to be; arms level, and where the
@@ -27,8 +25,8 @@ impl Search<'_> {
     pub fn usual(&self, bases: &[Placement], judge: &Judge) -> Vec<Placement> {
         let floor = self.measured.field.low[1];
         let places = match judge.settings.offset {
-            Some(offset) => vec![(Origin::Elsewhere, offset)],
-            None => vec![(Origin::Pelvis, [0.0; 3]), (Origin::Floor, [0.0, floor, 0.0])],
+            Some(offset) => vec![(FileOrigin::Elsewhere, offset)],
+            None => vec![(FileOrigin::Pelvis, [0.0; 3]), (FileOrigin::Floor, [0.0, floor, 0.0])],
         };
         let lowered = judge.settings.arms_lowered;
         let at = |base: &Placement| -> Vec<Placement> {
@@ -48,11 +46,12 @@ impl Search<'_> {
     fn with_arms(&self, placement: Placement, judge: &Judge) -> Option<Placement> {
         let turned = judge.turned(&placement, None, false);
         let scored = |degrees: &f64| {
-            judge.scored(Placement { arm_angle_degrees: *degrees, ..placement }, &turned, true, None)
+            let at = Placement { arm_angle_degrees: *degrees, ..placement };
+            judge.scored(Candidate::at(at), &turned, true)
         };
         let angles = ARM_ANGLES.iter().filter(|degrees| **degrees != 0.0).map(scored);
         let best = angles.max_by(|a, b| a.score.total_cmp(&b.score))?;
-        let steps = Steps { from: 0.06, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::Limbs };
+        let steps = ClimbSteps { from: 0.06, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::Limbs };
         let climbed = judge.with_openings(climbed(judge, &best, &steps));
         (climbed.is_worn || judge.settings.arms_lowered == Some(true)).then_some(climbed.placement)
     }
@@ -76,13 +75,9 @@ impl Search<'_> {
             return false;
         }
         let placed = placement.apply(cloth.positions);
-        let (mut net, mut total) = (vec![0.0; cloth.positions.len()], 0.0);
-        for (face, (cosine, area)) in
-            cloth.faces.iter().zip(outwardness(&placed, cloth.faces, self.surface()))
-        {
-            net[cloth.piece_of_vertex(face[0]) as usize] += cosine * area;
-            total += area;
-        }
-        net.iter().map(|area: &f64| area.abs()).sum::<f64>() > SHEET * total
+        let net = outward_area(&placed, cloth.faces, cloth.topology, self.surface());
+        let area = |f: &[u32; 3]| 0.5 * norm(triangle_normal(f.map(|v| placed[v as usize])));
+        let total: f64 = cloth.faces.iter().map(area).sum();
+        net.iter().map(|area| area.abs()).sum::<f64>() > SHEET_SHARE * total
     }
 }

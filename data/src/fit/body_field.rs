@@ -1,19 +1,18 @@
 //! The T-posed body as the placement search sees it: signed distances on grids, with limbs that turn at shoulders and hips.
 
-use super::limb_pose::{LIMBS, LimbPose};
+use super::limb_pose::{LIMB_ROOTS, LimbPose};
 use super::placement::Placement;
 use crate::asset::Body;
-use crate::generate::garment::Tube;
 use crate::generate::garment::measures::BodyMeasures;
-use crate::mesh::DistanceGrid;
+use crate::mesh::{DistanceGrid, compact};
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use std::sync::Arc;
 
 /// Node spacing of the grids (m).
-const STEP: f64 = 0.02;
+const FIELD_STEP: f64 = 0.02;
 /// Largest distance the grids tell (m): cloth farther away says nothing about where it belongs.
-const BAND: f64 = 0.25;
+const FIELD_BAND: f64 = 0.25;
 
 /// Signed distance to the body with its arms lowered by any angle.
 ///
@@ -38,7 +37,7 @@ pub(super) struct BodyField {
 }
 
 /// Parts of the body on which cloth may lie differently: legs, hips, chest, shoulders and neck, arms.
-pub(super) const PARTS: usize = 5;
+pub(super) const BODY_PARTS: usize = 5;
 
 /// Heights of the zero body (m).
 #[derive(Clone, Copy, Debug)]
@@ -100,30 +99,25 @@ impl Turn {
 
 impl BodyField {
     pub fn new(body: &Body) -> Self {
-        let side_of_joint = sides(body, LIMBS[0]);
-        let side = |face: &[u32; 3]| {
-            let mut share = [0.0; 2];
-            for v in face {
-                let (joints, weights) = body.skin_weights.row(*v as usize);
-                for (joint, weight) in joints.iter().zip(weights) {
-                    if let Some(side) = side_of_joint[usize::from(*joint)] {
-                        share[side] += f64::from(*weight) / 3.0;
-                    }
-                }
-            }
-            (0..2).find(|s| share[*s] > 0.5)
-        };
+        let weights = limb_weights(body, LIMB_ROOTS[0]);
         let mut parts: [Vec<[u32; 3]>; 3] = Default::default();
-        body.faces.iter().for_each(|f| parts[side(f).unwrap_or(2)].push(*f));
+        for (face, weight) in body.faces.iter().zip(weights) {
+            let side = [weight, -weight].into_iter().position(|share| share > 0.5);
+            parts[side.unwrap_or(2)].push(*face);
+        }
         let [left, right, trunk] = &parts;
         let distance = |faces: &[[u32; 3]]| {
             let (positions, faces, radius) = closed(&body.template, faces);
-            (DistanceGrid::new(&positions, &faces, STEP, BAND), radius)
+            (DistanceGrid::new(&positions, &faces, FIELD_STEP, FIELD_BAND), radius)
         };
-        let (trunk, (left, right)) = rayon::join(
-            || distance(trunk).0,
-            || rayon::join(|| arm(body, left, 0, &distance), || arm(body, right, 1, &distance)),
-        );
+        let arm = |side: usize, faces: &[[u32; 3]]| {
+            let shoulder = body.joint_place(LIMB_ROOTS[0][side]).filter(|_| !faces.is_empty())?;
+            let (distance, radius) = distance(faces);
+            // The deltoid lies within the cut.
+            Some(Arm { side: [1.0, -1.0][side], shoulder, radius: 0.9 * radius, distance })
+        };
+        let (trunk, (left, right)) =
+            rayon::join(|| distance(trunk).0, || rayon::join(|| arm(0, left), || arm(1, right)));
         let (low, high) = body.zero_body().bounds();
         let measures = BodyMeasures::new(body).ok();
         let height = |name: &str, share: f64| {
@@ -141,13 +135,18 @@ impl BodyField {
                 armpit: height("left_shoulder", 0.82) - 0.07,
             },
         };
-        let column = measures.map(|m| m.column);
-        let form = taut(trunk.clone(), column.as_ref(), &levels);
+        // Taut cloth spans it where its outlines are hollow: from the hips to below the armpits, where no column runs into the
+        // shoulders.
+        let mut form = trunk.clone();
+        if let Some(column) = measures.map(|m| m.column) {
+            let (bottom, top) = (levels.hip, levels.armpit - 0.02);
+            form.unite(|p| if p[1] > bottom && p[1] < top { column.value(p) } else { f64::MAX });
+        }
         let spine = ["pelvis", "spine1", "spine2", "spine3"].map(|name| body.joint_place(name));
         let spine: Vec<f64> = spine.into_iter().flatten().map(|p| p[2]).collect();
         let spine_z = spine.iter().sum::<f64>() / spine.len().max(1) as f64;
         let arms = left.into_iter().chain(right).collect();
-        let [left, right] = LIMBS[1].map(|name| body.joint_place(name));
+        let [left, right] = LIMB_ROOTS[1].map(|name| body.joint_place(name));
         let hips = left.zip(right).map(<[_; 2]>::from);
         let (trunk, form, weights) = (trunk.into(), form.into(), [None, None]);
         Self { trunk, form, arms, hips, weights, levels, low, high, spine_z }
@@ -158,7 +157,17 @@ impl BodyField {
     pub fn posed(&self, posed: &LimbPose, body: &Body) -> Self {
         let weights = std::array::from_fn(|limb| {
             let is_turned = posed.angles[limb] != 0.0;
-            is_turned.then(|| Arc::new(limb_weights(body, &posed.positions, LIMBS[limb])))
+            is_turned.then(|| {
+                let weights = limb_weights(body, LIMB_ROOTS[limb]);
+                let grid = DistanceGrid::with_attribute(
+                    &posed.positions,
+                    &body.faces,
+                    FIELD_STEP,
+                    FIELD_BAND,
+                    |face| weights[face],
+                );
+                Arc::new(grid.1)
+            })
         });
         Self { weights, ..self.clone() }
     }
@@ -170,7 +179,7 @@ impl BodyField {
     }
 
     /// Signed distance of `p` to the body as taut cloth sees it (m), outside positive, at most the band of the grids; and the
-    /// part of the body that is next to it, below [`PARTS`].
+    /// part of the body that is next to it, below [`BODY_PARTS`].
     pub fn gap(&self, p: [f64; 3], turn: LimbTurn) -> (f64, usize) {
         let arm = self.weights[0].as_ref().map_or(0.0, |grid| grid.distance(p));
         let p = self.legs_together(p, turn.legs);
@@ -186,7 +195,7 @@ impl BodyField {
             let raised = arms.undone(p, arm.shoulder, arm.side);
             let distance = arm.distance.distance(raised).min(norm(sub(p, arm.shoulder)) - arm.radius);
             if distance < gap {
-                (gap, part) = (distance, PARTS - 1);
+                (gap, part) = (distance, BODY_PARTS - 1);
             }
         }
         (gap, part)
@@ -231,41 +240,17 @@ fn turned_back(p: [f64; 3], weight: f64, turn: Turn, joint: [f64; 3]) -> [f64; 3
     back
 }
 
-/// The signed weight that the body's surface next to each point has of the left (positive) and right (negative) of two limbs.
-fn limb_weights(body: &Body, posed: &[[f64; 3]], from: [&str; 2]) -> DistanceGrid {
+/// The signed weight that each face of a body has of the left (positive) and right (negative) of two limbs.
+fn limb_weights(body: &Body, from: [&str; 2]) -> Vec<f64> {
     let sides = sides(body, from);
-    let weight = |face: usize| {
-        let of_vertex = |v: &u32| {
-            let (joints, weights) = body.skin_weights.row(*v as usize);
-            let signed = joints.iter().zip(weights).filter_map(|(joint, weight)| {
-                sides[usize::from(*joint)].map(|side| [1.0, -1.0][side] * f64::from(*weight))
-            });
-            signed.sum::<f64>()
-        };
-        body.faces[face].iter().map(of_vertex).sum::<f64>() / 3.0
+    let of_vertex = |v: &u32| {
+        let (joints, weights) = body.skin_weights.row(*v as usize);
+        let signed = joints.iter().zip(weights).filter_map(|(joint, weight)| {
+            sides[usize::from(*joint)].map(|side| [1.0, -1.0][side] * f64::from(*weight))
+        });
+        signed.sum::<f64>()
     };
-    DistanceGrid::with_attribute(posed, &body.faces, STEP, BAND, weight).1
-}
-
-/// A trunk whose outlines are convex between hips and armpits, as taut cloth spans it.
-fn taut(mut trunk: DistanceGrid, column: Option<&Tube>, levels: &Levels) -> DistanceGrid {
-    // Below the armpits, where no column runs into the shoulders.
-    let (bottom, top) = (levels.hip, levels.armpit - 0.02);
-    if let Some(column) = column {
-        trunk.unite(|p| if p[1] > bottom && p[1] < top { column.value(p) } else { f64::MAX });
-    }
-    trunk
-}
-
-fn arm(
-    body: &Body,
-    faces: &[[u32; 3]],
-    side: usize,
-    distance: &dyn Fn(&[[u32; 3]]) -> (DistanceGrid, f64),
-) -> Option<Arm> {
-    let shoulder = body.joint_place(LIMBS[0][side]).filter(|_| !faces.is_empty())?;
-    let (distance, radius) = distance(faces);
-    Some(Arm { side: [1.0, -1.0][side], shoulder, radius: 0.9 * radius, distance })
+    body.faces.iter().map(|face| face.iter().map(of_vertex).sum::<f64>() / 3.0).collect()
 }
 
 /// For every joint whether it belongs to the left (0) or right (1) of two limbs, from these joints on.
@@ -281,20 +266,8 @@ fn sides(body: &Body, from: [&str; 2]) -> Vec<Option<usize>> {
 
 /// Faces with every border closed by a fan around its centroid, and the mean radius of the longest border (m).
 fn closed(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>, f64) {
-    let mut number = vec![u32::MAX; positions.len()];
-    let mut used = Vec::new();
-    let mut all: Vec<[u32; 3]> = faces
-        .iter()
-        .map(|f| {
-            f.map(|v| {
-                if number[v as usize] == u32::MAX {
-                    number[v as usize] = used.len() as u32;
-                    used.push(positions[v as usize]);
-                }
-                number[v as usize]
-            })
-        })
-        .collect();
+    let (used, mut all) = compact(faces.iter().copied(), positions.len());
+    let mut used: Vec<[f64; 3]> = used.iter().map(|v| positions[*v as usize]).collect();
     let (mut longest, mut radius) = (0, 0.0);
     let Ok(mesh) = TriMesh::new(used.clone(), all.clone()) else { return (used, all, radius) };
     for border in Topology::new(&mesh).boundary_loops {
@@ -324,13 +297,14 @@ mod tests {
         let field = BodyField::new(&body);
         for degrees in [0.0, 45.0] {
             let placement = Placement { arm_angle_degrees: degrees, ..Placement::AS_GIVEN };
-            let (turn, posed) = (LimbTurn::of(&placement), LimbPose::of(&body, &placement));
+            let turn = LimbTurn::of(&placement);
+            let surface = LimbPose::of(&body, &placement).surface(&body);
             let mut errors: Vec<f64> = (0..3000)
                 .map(|i| {
                     let t = [0.754_877_666, 0.569_840_291, 0.438_579_021].map(|s| (s * f64::from(i)).fract());
                     let p = std::array::from_fn(|k| field.low[k] + t[k] * (field.high[k] - field.low[k]));
-                    let exact = posed.surface.gap(p, Distance::ClosestPoint).gap;
-                    (field.gap(p, turn).0 - exact.min(BAND)).abs()
+                    let exact = surface.gap(p, Distance::ClosestPoint).gap;
+                    (field.gap(p, turn).0 - exact.min(FIELD_BAND)).abs()
                 })
                 .collect();
             errors.sort_by(f64::total_cmp);

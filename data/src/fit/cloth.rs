@@ -1,13 +1,12 @@
 //! A garment as the placement search sees it, in the file's coordinates.
 
-use super::samples::Samples;
-use crate::mesh::bounds;
+use crate::mesh::{bounds, triangle_normal};
 use clothcombo_physics::Topology;
-use clothcombo_physics::vec3::{norm, sub};
+use clothcombo_physics::vec3::{add, norm, scale, sub};
 
 /// Sample points for the coarse and for the fine search.
-const COARSE: usize = 200;
-const FINE: usize = 1000;
+const COARSE_SAMPLES: usize = 200;
+const FINE_SAMPLES: usize = 1000;
 /// Points of a border that are looked at, about.
 const BORDER_POINTS: usize = 60;
 
@@ -20,13 +19,13 @@ pub(super) struct Cloth<'a> {
     /// Their lengths.
     pub border_lengths: Vec<f64>,
     pub topology: &'a Topology,
-    pub coarse: Samples,
-    pub fine: Samples,
+    /// Points spread evenly over its area, for the coarse and for the fine search.
+    pub coarse: Vec<[f64; 3]>,
+    pub fine: Vec<[f64; 3]>,
 }
 
 impl<'a> Cloth<'a> {
     pub fn new(positions: &'a [[f64; 3]], faces: &'a [[u32; 3]], topology: &'a Topology) -> Self {
-        let samples = |count| Samples::new(positions, faces, count);
         let borders = &topology.boundary_loops;
         let length = |border: &Vec<u32>| {
             let next = border.iter().cycle().skip(1);
@@ -40,17 +39,9 @@ impl<'a> Cloth<'a> {
             borders,
             border_lengths,
             topology,
-            coarse: samples(COARSE),
-            fine: samples(FINE),
+            coarse: spread_over(positions, faces, COARSE_SAMPLES),
+            fine: spread_over(positions, faces, FINE_SAMPLES),
         }
-    }
-
-    /// The same at other positions, such as another size.
-    pub fn moved<'b>(&self, positions: &'b [[f64; 3]]) -> Cloth<'b>
-    where
-        'a: 'b,
-    {
-        Cloth::new(positions, self.faces, self.topology)
     }
 
     /// Largest extent in the file's unit.
@@ -86,4 +77,26 @@ impl<'a> Cloth<'a> {
         let stride = self.borders[border].len().div_ceil(BORDER_POINTS);
         self.border(border).into_iter().step_by(stride.max(1)).collect()
     }
+}
+
+/// `count` points spread evenly over the area of a surface.
+pub(super) fn spread_over(positions: &[[f64; 3]], faces: &[[u32; 3]], count: usize) -> Vec<[f64; 3]> {
+    let corners = |f: &[u32; 3]| f.map(|v| positions[v as usize]);
+    let mut sum = 0.0;
+    let cumulative: Vec<f64> = (faces.iter())
+        .map(|f| {
+            sum += norm(triangle_normal(corners(f)));
+            sum
+        })
+        .collect();
+    let point = |k: usize| {
+        let wanted = (k as f64 + 0.5) / count as f64 * sum;
+        let face = cumulative.partition_point(|s| *s < wanted).min(faces.len() - 1);
+        let [a, b, c] = corners(&faces[face]);
+        // A low-discrepancy sequence folded into the triangle.
+        let (u, v) = ((k as f64 * 0.754_877_666).fract(), (k as f64 * 0.569_840_291).fract());
+        let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+        add(a, add(scale(sub(b, a), u), scale(sub(c, a), v)))
+    };
+    (0..count).map(point).collect()
 }

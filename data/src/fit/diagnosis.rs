@@ -1,25 +1,22 @@
 //! Why a mesh is not worn as it is, told by what would be: one of its pieces, or all of it at another size.
 
 use super::cloth::Cloth;
-use super::error::FitError;
+use super::error::{FitError, Size};
 use super::judge::Candidate;
 use super::pieces::stray_pieces;
-use super::placement::{Origin, Unit, UpAxis};
+use super::placement::{FileOrigin, Unit, UpAxis};
+use super::readings::believed;
 use super::search::Search;
 use super::settings::FitSettings;
-use super::verdict::Readings;
 use crate::mesh::compact;
 use clothcombo_physics::vec3::{norm, scale, sub};
 use clothcombo_physics::{Topology, TriMesh};
-use std::fmt;
 
 /// Ratio of one size tried to the next, and how many are tried on either side.
 const SIZE_STEP: f64 = 1.2;
-const SIZES: i32 = 8;
+const SIZES_EACH_WAY: i32 = 8;
 /// Another size explains that much more (log-posterior), or nothing is said.
 const SIZE_EVIDENCE: f64 = 12.0;
-/// Clothes that are worn are not this many times as large or small as those that fit.
-const OTHER_SIZE: f64 = 1.6;
 /// Cloth farther from the body on average (m), or with a larger share inside it, may be of another size.
 const LOOSE: f64 = 0.035;
 const TIGHT: f64 = 0.05;
@@ -27,42 +24,9 @@ const TIGHT: f64 = 0.05;
 const MOST_PIECES: usize = 3;
 /// A border this near to a plane, as a share of the extent, and with this share of its length, is cut by it.
 const ON_CUT: f64 = 1e-3;
-const CUT: [f64; 2] = [0.25, 0.95];
+const CUT_SHARES: [f64; 2] = [0.25, 0.95];
 /// The rest of that border reaches this far from the plane, as a share of the extent: a hem does not.
 const BEYOND_CUT: f64 = 0.1;
-
-/// A garment of another size.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Size {
-    /// Its largest extent (m), in this unit.
-    pub extent: f64,
-    /// Unit in which that is.
-    pub unit: Unit,
-    /// Factor at which it would fit.
-    pub factor: f64,
-}
-
-impl Size {
-    /// How many times too large or too small it is.
-    fn ratio(&self) -> f64 {
-        self.factor.max(1.0 / self.factor)
-    }
-
-    /// Whether nobody of this body's size wears it.
-    pub(super) fn is_refused(&self) -> bool {
-        self.ratio() > OTHER_SIZE
-    }
-}
-
-impl fmt::Display for Size {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { extent, unit, factor } = self;
-        write!(
-            f,
-            "it measures {extent:.2} m from end to end (unit {unit}), and fits much better scaled by about {factor:.2}"
-        )
-    }
-}
 
 /// What is wrong with a mesh that looks worn nowhere, if that can be told.
 pub(super) fn diagnosed(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option<FitError> {
@@ -112,7 +76,7 @@ pub(super) fn size_doubt(
         ..settings.clone()
     };
     // What is known has no say there.
-    let score = taken.score - p.log_prior(settings) + p.log_prior(&known);
+    let score = taken.score - settings.log_prior(p) + known.log_prior(p);
     let (size, found) = other_size(search, cloth, &known)?;
     (found - score > SIZE_EVIDENCE).then_some(size)
 }
@@ -124,18 +88,14 @@ fn other_size(search: &Search, cloth: &Cloth, known: &FitSettings) -> Option<(Si
     let extent = cloth.extent();
     let at = |factor: f64| {
         let positions: Vec<[f64; 3]> = cloth.positions.iter().map(|p| scale(*p, factor)).collect();
-        if !search.is_plausible_extent(factor * extent * unit.metres()) {
-            return None;
-        }
-        let scaled = cloth.moved(&positions);
-        let candidates = search.quick_candidates(&scaled, factor * extent, known);
-        let best = *Readings::new(&candidates, search, &scaled).believed.first()?;
-        let is_told = !best.is_tube || best.placement.origin != Origin::Elsewhere;
+        let scaled = Cloth::new(&positions, cloth.faces, cloth.topology);
+        let best = believed(&search.quick_candidates(&scaled, known), search, &scaled)?;
+        let is_told = !best.is_tube || best.placement.origin != FileOrigin::Elsewhere;
         is_told.then_some((Size { extent: extent * unit.metres(), unit, factor }, best.score))
     };
     let better = |a: &(Size, f64), b: &(Size, f64)| a.1.total_cmp(&b.1);
     // One that is nearer to its own explains what the next one would be told for.
-    let steps = (-SIZES..=SIZES).filter(|k| *k != 0).map(f64::from).chain([-0.75, 0.75]);
+    let steps = (-SIZES_EACH_WAY..=SIZES_EACH_WAY).filter(|k| *k != 0).map(f64::from).chain([-0.75, 0.75]);
     steps.filter_map(|k| at(SIZE_STEP.powf(k))).max_by(better)
 }
 
@@ -158,7 +118,7 @@ fn half(cloth: &Cloth) -> Option<FitError> {
                     }
                 }
                 let share = on / f64::max(all, f64::MIN_POSITIVE);
-                if (CUT[0]..CUT[1]).contains(&share) && reach > BEYOND_CUT * cloth.extent() {
+                if (CUT_SHARES[0]..CUT_SHARES[1]).contains(&share) && reach > BEYOND_CUT * cloth.extent() {
                     return Some(FitError::Half { axis: name, at, share });
                 }
             }
@@ -174,8 +134,7 @@ fn upside_down(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option
     }
     let believed = UpAxis::DOWN.into_iter().filter_map(|up| {
         let known = FitSettings { up: Some(up), ..settings.clone() };
-        let candidates = search.candidates(cloth, cloth.extent(), &known);
-        let best = *Readings::new(&candidates, search, cloth).believed.first()?;
+        let best = believed(&search.candidates(cloth, &known), search, cloth)?;
         (!best.is_tube).then_some((up, best.score))
     });
     let (up, _) = believed.max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -199,8 +158,7 @@ fn beside(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option<FitE
         let mesh = TriMesh::new(used.iter().map(|v| cloth.positions[*v as usize]).collect(), faces).ok()?;
         let topology = Topology::new(&mesh);
         let alone = Cloth::new(mesh.positions(), mesh.faces(), &topology);
-        let candidates = search.candidates(&alone, mesh.extent(), settings);
-        let placement = Readings::new(&candidates, search, &alone).believed.first()?.placement;
+        let placement = believed(&search.candidates(&alone, settings), search, &alone)?.placement;
         let worn = search.judge(cloth, settings).worn_pieces(&placement);
         let placed = placement.apply(cloth.positions);
         let stray = stray_pieces(&placed, cloth.topology, search.surface(), &worn);

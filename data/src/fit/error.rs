@@ -1,16 +1,54 @@
 //! Why a mesh is no garment of a body.
 
-use super::diagnosis::Size;
 use super::pieces::StrayPiece;
 use super::placement::{Unit, UpAxis};
-use super::settings::{MAX_VERTICES, MIN_TRIANGLES, MOST_STRETCH};
+use super::settings::{MAX_GARMENT_VERTICES, MIN_TRIANGLES, MOST_STRETCH};
+use std::fmt;
 use thiserror::Error;
+
+/// Clothes that are worn are not this many times as large or small as those that fit.
+const OTHER_SIZE: f64 = 1.6;
+
+/// A garment of another size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size {
+    /// Its largest extent (m), in this unit.
+    pub extent: f64,
+    /// Unit in which that is.
+    pub unit: Unit,
+    /// Factor at which it would fit.
+    pub factor: f64,
+}
+
+impl Size {
+    /// How many times too large or too small it is.
+    pub(super) fn ratio(&self) -> f64 {
+        self.factor.max(1.0 / self.factor)
+    }
+
+    /// Whether nobody of this body's size wears it.
+    pub(super) fn is_refused(&self) -> bool {
+        self.ratio() > OTHER_SIZE
+    }
+}
+
+impl fmt::Display for Size {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { extent, unit, factor } = self;
+        write!(
+            f,
+            "it measures {extent:.2} m from end to end (unit {unit}), and fits much better scaled by about {factor:.2}"
+        )
+    }
+}
 
 /// Why a mesh is not fitted.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum FitError {
     /// Too many vertices.
-    #[error("{vertices} vertices, more than the {MAX_VERTICES} a garment may have; decimate it first")]
+    #[error(
+        "{vertices} vertices, more than the {MAX_GARMENT_VERTICES} a garment may have; decimate it first"
+    )]
     TooManyVertices {
         /// After welding.
         vertices: usize,

@@ -19,7 +19,7 @@ const FARTHEST_ORIGIN: f64 = 1e4;
 /// What is known about one garment: keys of an outfits file.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct GarmentEntry {
+pub struct GarmentHints {
     /// File or name.
     pub file: String,
     unit: Option<String>,
@@ -37,7 +37,7 @@ pub struct GarmentEntry {
     pub material: GarmentMaterial,
 }
 
-impl GarmentEntry {
+impl GarmentHints {
     /// `all` with what is said here in its place; `beside` finds a file that is named here.
     ///
     /// # Errors
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn an_entry_comes_before_the_flags() {
         let all = FitSettings { unit: Some(Unit::M), up: Some(UpAxis::Z), ..FitSettings::default() };
-        let entry: GarmentEntry =
+        let entry: GarmentHints =
             toml::from_str("file = \"tee.obj\"\nunit = \"cm\"\nkeep = \"outer\"\noffset = [0.0, 1.0, 0.0]")
                 .unwrap();
         let settings = entry.settings(&all, str::to_owned).unwrap();
@@ -194,17 +194,17 @@ mod tests {
             (Some(Unit::Cm), Some(UpAxis::Z), Keep::Outer)
         );
         assert_eq!(settings.offset, Some([0.0, 1.0, 0.0]));
-        let wrong: GarmentEntry = toml::from_str("file = \"tee.obj\"\nup = \"north\"").unwrap();
+        let wrong: GarmentHints = toml::from_str("file = \"tee.obj\"\nup = \"north\"").unwrap();
         assert!(wrong.settings(&all, str::to_owned).unwrap_err().starts_with("up: 'north'"));
-        assert!(toml::from_str::<GarmentEntry>("file = \"tee.obj\"\nsize = 4").is_err());
+        assert!(toml::from_str::<GarmentHints>("file = \"tee.obj\"\nsize = 4").is_err());
         for (key, wrong) in
             [("offset", "offset = [0.0, 2e4, 0.0]"), ("legs", "legs = 70.0"), ("turn", "turn = nan")]
         {
-            let entry: GarmentEntry = toml::from_str(&format!("file = \"tee.obj\"\n{wrong}")).unwrap();
+            let entry: GarmentHints = toml::from_str(&format!("file = \"tee.obj\"\n{wrong}")).unwrap();
             let message = entry.settings(&all, str::to_owned).unwrap_err();
             assert!(message.starts_with(&format!("{key}: '")), "{message}");
         }
-        let missing: GarmentEntry = toml::from_str("file = \"tee.obj\"\nfrom_body = \"none.npz:1\"").unwrap();
+        let missing: GarmentHints = toml::from_str("file = \"tee.obj\"\nfrom_body = \"none.npz:1\"").unwrap();
         let message = missing.settings(&all, |path| format!("folder/{path}")).unwrap_err();
         assert!(message.starts_with("from_body: folder/none.npz"), "{message}");
     }

@@ -1,13 +1,13 @@
 //! What speaks for a placement: a log-posterior.
 //!
 //! It sums how likely the gaps between cloth and body are for clothes that are worn
-//! ([`likelihood`](super::likelihood)), how usual such a file is ([`Placement::log_prior`]), how its upper rim lies,
+//! ([`likelihood`](super::likelihood)), how usual such a file is ([`FitSettings::log_prior`]), how its upper rim lies,
 //! and whether limbs pass through openings instead of cloth ([`anatomy`](super::anatomy)).
 
-use super::anatomy::{PiercingBones, Skeleton};
+use super::anatomy::{BodySkeleton, PiercingBones};
 use super::body_field::{BodyField, LimbTurn};
 use super::cloth::Cloth;
-use super::likelihood::{log_likelihood, rough_log_likelihood};
+use super::likelihood::{log_likelihood, normal_density, rough_log_likelihood};
 use super::placement::Placement;
 use super::settings::FitSettings;
 use crate::asset::Category;
@@ -32,7 +32,7 @@ const SYMMETRY: f64 = 0.02;
 const ASYMMETRY_COST: f64 = 8.0;
 
 /// A placement and what speaks for it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Candidate {
     pub placement: Placement,
     /// Log-likelihood of the gaps.
@@ -61,11 +61,18 @@ pub(super) struct Candidate {
     pub is_unfounded_turn: bool,
 }
 
+impl Candidate {
+    /// One of which nothing else is known.
+    pub fn at(placement: Placement) -> Self {
+        Self { placement, ..Self::default() }
+    }
+}
+
 /// Judges placements of one garment on one body.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Judge<'a> {
-    pub field: &'a BodyField,
-    pub skeleton: &'a Skeleton,
+    pub field: BodyField,
+    pub skeleton: &'a BodySkeleton,
     pub cloth: &'a Cloth<'a>,
     pub settings: &'a FitSettings,
 }
@@ -83,22 +90,17 @@ impl Judge<'_> {
     pub fn turned(&self, placement: &Placement, rim: Option<usize>, is_fine: bool) -> Turned {
         let untranslated = Placement { translation: [0.0; 3], ..*placement };
         let samples = if is_fine { &self.cloth.fine } else { &self.cloth.coarse };
-        let points = untranslated.apply(&samples.0);
+        let points = untranslated.apply(samples);
         let rim = rim.map_or(Vec::new(), |border| untranslated.apply(&self.cloth.border_points(border)));
         let end = |pick: fn(f64, f64) -> f64, start| points.iter().map(|p| p[0]).fold(start, pick);
         let middle = 0.5 * (end(f64::min, f64::MAX) + end(f64::max, f64::MIN));
         Turned { points, rim, middle }
     }
 
-    /// By the blunt likelihood, in which a garment some centimetres from its place still counts, or by the sharp one. Openings
-    /// are taken from `like`.
-    pub fn scored(
-        &self,
-        placement: Placement,
-        turned: &Turned,
-        is_sharp: bool,
-        like: Option<&Candidate>,
-    ) -> Candidate {
+    /// A candidate scored anew: by the blunt likelihood, in which a garment some centimetres from its place still counts, or by the
+    /// sharp one.
+    pub fn scored(&self, candidate: Candidate, turned: &Turned, is_sharp: bool) -> Candidate {
+        let placement = candidate.placement;
         let (turn, t) = (LimbTurn::of(&placement), placement.translation);
         let gaps = turned.points.iter().map(|p| self.field.gap(add(*p, t), turn));
         let fit = match is_sharp {
@@ -108,23 +110,8 @@ impl Judge<'_> {
         let aside = (turned.middle + t[0]) / SYMMETRY;
         let symmetry = if is_sharp { (0.5 * aside * aside).min(ASYMMETRY_COST) } else { 0.0 };
         let score =
-            fit + placement.log_prior(self.settings) - symmetry + self.rim_score(&turned.rim, &placement);
-        let unknown = Candidate {
-            placement,
-            fit,
-            score,
-            piercing: PiercingBones::default(),
-            rim: None,
-            is_worn: true,
-            worn_pieces: 1,
-            neck_over_hem: 0.0,
-            is_tube: false,
-            rim_distance: 0.0,
-            idle_openings: 0,
-            neck_drop: None,
-            is_unfounded_turn: false,
-        };
-        Candidate { placement, fit, score, ..like.copied().unwrap_or(unknown) }
+            fit + self.settings.log_prior(&placement) - symmetry + self.rim_score(&turned.rim, &placement);
+        Candidate { fit, score, ..candidate }
     }
 
     /// What speaks for the upper rim: it lies on the body, all around, at the waist or above the chest.
@@ -141,30 +128,29 @@ impl Judge<'_> {
     /// Logarithm of the density of an upper rim's height over that of a height anywhere on hips or chest.
     fn rim_prior(&self, height: f64) -> f64 {
         /// Shares of rims at the waist and above the chest.
-        const USUAL: [f64; 2] = [0.6, 0.35];
+        const RIM_SHARES: [f64; 2] = [0.6, 0.35];
         /// Density anywhere else, and anywhere on hips or chest (1/m).
         const ELSEWHERE: f64 = 0.02;
         const UNIFORM: f64 = 5.0;
-        let normal = |middle: f64, spread: f64| {
-            (-0.5 * ((height - middle) / spread).powi(2)).exp() / (spread * std::f64::consts::TAU.sqrt())
-        };
         let shares = match self.settings.category {
-            None => USUAL,
+            None => RIM_SHARES,
             Some(Category::Skirt | Category::Trousers) => [1.0, 0.0],
             Some(_) => [0.0, 1.0],
         };
         let levels = self.field.levels;
-        let density =
-            shares[0] * normal(levels.waist - 0.03, 0.035) + shares[1] * normal(levels.armpit - 0.035, 0.03);
+        // Waistbands sit 3 cm below the waist, strapless tops 3.5 cm below the armpits, give or take as much.
+        let waistband = normal_density(height, levels.waist - 0.03, 0.035);
+        let strapless = normal_density(height, levels.armpit - 0.035, 0.03);
+        let density = shares[0] * waistband + shares[1] * strapless;
         (density + ELSEWHERE).ln() - UNIFORM.ln()
     }
 
     /// A placement as it stands, by everything.
     pub fn judged(&self, placement: Placement) -> Candidate {
-        let openings =
-            self.with_openings(self.scored(placement, &self.turned(&placement, None, true), true, None));
+        let turned = self.turned(&placement, None, true);
+        let openings = self.with_openings(self.scored(Candidate::at(placement), &turned, true));
         let turned = self.turned(&placement, openings.rim, true);
-        let scored = self.scored(placement, &turned, true, Some(&openings));
+        let scored = self.scored(openings, &turned, true);
         let (turn, t) = (LimbTurn::of(&placement), placement.translation);
         let distances = turned.rim.iter().map(|p| self.field.gap(add(*p, t), turn).0.abs());
         let rim_distance = distances.sum::<f64>() / turned.rim.len().max(1) as f64;

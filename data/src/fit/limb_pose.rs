@@ -1,27 +1,28 @@
-//! Bodies with lowered arms and legs apart, and garments back from there to the T-pose.
+//! Bodies with lowered arms and legs apart.
 
 use super::placement::Placement;
-use crate::asset::body::unskin;
-use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose};
-use clothcombo_physics::TriMesh;
+use crate::asset::{Body, Pose};
 use clothcombo_physics::query::Surface;
 
-/// The zero body with its arms this far below the horizontal, and each leg this far outwards (degrees).
-#[derive(Debug)]
+/// A body with its arms this far below the horizontal, and each leg this far outwards.
+#[derive(Clone, Debug)]
 pub(super) struct LimbPose {
+    /// Of arms and legs (degrees).
     pub angles: [f64; 2],
-    pub pose: Pose,
+    pub shape: Vec<f64>,
+    /// Posed vertices (m).
     pub positions: Vec<[f64; 3]>,
-    pub surface: Surface<f64>,
+    pub bones: Vec<[[f64; 4]; 3]>,
 }
 
 /// Joints of arms and of legs that are turned, left and right.
-pub(super) const LIMBS: [[&str; 2]; 2] = [["left_shoulder", "right_shoulder"], ["left_hip", "right_hip"]];
+pub(super) const LIMB_ROOTS: [[&str; 2]; 2] =
+    [["left_shoulder", "right_shoulder"], ["left_hip", "right_hip"]];
 
 /// The pose in which arms hang down and legs are apart by these angles (degrees); joints that a body lacks stay as they are.
 pub(super) fn limb_pose(body: &Body, angles: [f64; 2]) -> Pose {
     let mut pose = Pose::t_pose(body.joint_count());
-    for (names, inwards) in LIMBS.iter().zip([angles[0], -angles[1]]) {
+    for (names, inwards) in LIMB_ROOTS.iter().zip([angles[0], -angles[1]]) {
         for (name, sign) in names.iter().zip([-1.0, 1.0]) {
             if let Some(j) = body.joint(name) {
                 pose.rotations[j] = [0.0, 0.0, sign * inwards.to_radians()];
@@ -32,62 +33,30 @@ pub(super) fn limb_pose(body: &Body, angles: [f64; 2]) -> Pose {
 }
 
 impl LimbPose {
-    /// In a garment's pose.
-    pub fn of(body: &Body, placement: &Placement) -> Self {
-        let angles = [placement.arm_angle_degrees, placement.leg_angle_degrees];
-        let pose = limb_pose(body, angles);
-        let mut positions = body.template.clone();
-        // The pose has exactly the body's joints and no shape numbers: nothing to refuse.
-        if angles != [0.0; 2]
-            && let Ok(posed) = body.posed(&[], &pose)
-        {
-            positions = posed.positions;
-        }
-        let surface = Surface::new(positions.clone(), body.faces.clone());
-        Self { angles, pose, positions, surface }
+    /// # Errors
+    /// When the shape has more numbers than the body.
+    pub fn new(body: &Body, shape: &[f64], angles: [f64; 2]) -> Result<Self, String> {
+        let posed = body.posed(shape, &limb_pose(body, angles)).map_err(|e| e.to_string())?;
+        Ok(Self { angles, shape: shape.to_vec(), positions: posed.positions, bones: posed.bones })
     }
 
-    /// Carries a garment on this body to the zero body: inverts the linear blend skinning of its binding. The binding depends
-    /// on where the garment ends up, so it is first taken on the posed body and then twice on the result.
-    pub fn to_t_pose(
-        &self,
-        positions: &[[f64; 3]],
-        faces: &[[u32; 3]],
-        category: Option<Category>,
-        body: &Body,
-    ) -> Result<Vec<[f64; 3]>, String> {
-        if self.angles == [0.0; 2] {
-            return Ok(positions.to_vec());
-        }
-        // Shapes are not needed here, and copying them would cost more than everything else.
-        let mut bare = body.clone();
-        (bare.shape_directions, bare.shape_count, bare.pose_directions) = (Vec::new(), 0, None);
-        let mut posed = bare.clone();
-        posed.template = self.positions.clone();
-        let bones = body.bone_transforms(&body.joint_template, &self.pose);
-        let settings = BindingSettings { shape_transfer: false, ..BindingSettings::default() };
-        let mut rest = positions.to_vec();
-        for round in 0..3 {
-            let mesh = TriMesh::new(rest, faces.to_vec()).map_err(|e| e.to_string())?;
-            let category = category.unwrap_or_else(|| Category::guess(&mesh, body));
-            let garment = Garment::new(category, mesh);
-            let binding = Binding::new(&garment, if round == 0 { &posed } else { &bare }, &settings);
-            rest = positions
-                .iter()
-                .zip(binding.skin_weights.chunks_exact(body.joint_count()))
-                .map(|(p, row)| unskin(*p, bones.iter().zip(row).map(|(bone, w)| (bone, f64::from(*w)))))
-                .collect::<Option<_>>()
-                .ok_or(
-                    "arms and legs cannot be brought to the T-pose: a blended bone transform has no inverse",
-                )?;
-        }
-        Ok(rest)
+    /// The zero body in a garment's pose.
+    pub fn of(body: &Body, placement: &Placement) -> Self {
+        let angles = [placement.arm_angle_degrees, placement.leg_angle_degrees];
+        Self::new(body, &[], angles).expect("a pose of the body's own joints, and no shape")
+    }
+
+    /// Its surface (m).
+    pub fn surface(&self, body: &Body) -> Surface<f64> {
+        Surface::new(self.positions.clone(), body.faces.clone())
     }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::asset::{Binding, BindingSettings, Category, Garment};
+    use crate::fit::from_body::{POSE_BINDINGS, SameModel, SourceCloth};
     use crate::generate::garment::generated;
     use crate::generate::mannequin;
 
@@ -105,7 +74,9 @@ pub(super) mod tests {
         let shirt = generated(&body, Category::TShirt, 3, 700);
         let arms = LimbPose::of(&body, &Placement { arm_angle_degrees: 40.0, ..Placement::AS_GIVEN });
         let posed = posed(&shirt, &body, [40.0, 0.0]);
-        let back = arms.to_t_pose(&posed, shirt.rest.faces(), Some(shirt.category), &body).unwrap();
+        let cloth =
+            SourceCloth { positions: &posed, faces: shirt.rest.faces(), category: Some(shirt.category) };
+        let back = SameModel::posed(&body, arms).unwrap().carry(&cloth, &body, POSE_BINDINGS).unwrap();
         let mut errors: Vec<f64> = back
             .iter()
             .zip(shirt.rest.positions())

@@ -10,7 +10,6 @@ mod climb;
 mod cloth;
 mod coverage;
 mod diagnosis;
-mod doubt;
 mod error;
 mod from_body;
 pub mod hints;
@@ -21,9 +20,9 @@ mod openings;
 mod pieces;
 mod placed;
 mod placement;
+mod readings;
 mod repair;
 mod report;
-mod samples;
 mod search;
 mod settings;
 mod sheet;
@@ -31,18 +30,18 @@ mod sitting;
 mod verdict;
 
 pub use coverage::off_trunk;
-pub use diagnosis::Size;
-pub use error::FitError;
+pub use error::{FitError, Size};
 pub use from_body::{Carried, SourceBody, SourcePlacement};
 pub use pieces::{StrayPiece, stray_pieces};
 pub use placed::{PlacementCheck, is_on_body};
-pub use placement::{Origin, Placement, Unit, UpAxis};
+pub use placement::{FileOrigin, Placement, Unit, UpAxis};
 pub(crate) use repair::is_double;
 pub use repair::needs_repair;
 pub use report::{
     BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind, SeamReport, contact_warnings,
+    outfit_warning,
 };
-pub use settings::{FitSettings, Keep, MAX_VERTICES, MIN_TRIANGLES};
+pub use settings::{FitSettings, Keep, MAX_GARMENT_VERTICES, MIN_TRIANGLES};
 pub use sitting::Sitting;
 
 use crate::asset::{Body, Garment};
@@ -55,19 +54,19 @@ use clothcombo_physics::mesh::vertex_normals;
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use diagnosis::diagnosed;
-use doubt::Doubt;
+use from_body::{POSE_BINDINGS, SameModel, SourceCloth};
 use limb_pose::LimbPose;
-use pieces::refuse_stray_pieces;
 use repair::{finish_seams, gaps, repair, turn_outward};
 use search::{Search, SearchBody};
 use settings::{LEAST_PIECE, MOST_STRETCH, MOST_STRETCHED};
-use verdict::{Verdict, verdict};
+use sheet::mesh_of;
+use verdict::{ARMS_MISS, PlacementVerdict, verdict};
 
 /// Least distance between a fitted vertex and the body (m): the ε of the paper's body collision loss.
-const CLEARANCE: f64 = 0.002;
+const FIT_CLEARANCE: f64 = 0.002;
 
 /// Widest open seam that does not keep panels from being placed, as a share of the garment's extent.
-const SEAM: f64 = 0.01;
+const SEAM_SHARE: f64 = 0.01;
 
 /// A fitted garment and how it came about.
 #[derive(Clone, Debug)]
@@ -112,8 +111,7 @@ pub fn in_file_order(follows: &[Attachment], positions: &[[f64; 3]], faces: &[[u
 /// [`FitError`] if the mesh is not a garment of this body, with the reason.
 pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fitted, FitError> {
     let mut sheet = repair(file, settings)?;
-    let mesh = TriMesh::new(sheet.positions.clone(), sheet.faces.clone())
-        .map_err(|e| FitError::Mesh(e.to_string()))?;
+    let mesh = sheet.mesh()?;
     let topology = Topology::new(&mesh);
     if topology.boundary_loops.is_empty() {
         return Err(FitError::Closed);
@@ -124,37 +122,36 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     }
 
     let measured = SearchBody::new(body)?;
-    let search = Search::new(body, &measured);
-    let extent = mesh.extent();
+    let search = Search { body, measured: &measured };
     let cloth = Cloth::new(&sheet.positions, &sheet.faces, &topology);
-    let units = settings.unit.map_or(Unit::ALL.to_vec(), |u| vec![u]);
-    if !units.iter().any(|u| search.is_plausible_extent(extent * u.metres())) {
-        let too_large = FitError::Extent { extent, unit: settings.unit, reach: search.reach() };
+    if search.plausible_units(&cloth, settings).is_empty() {
+        let too_large =
+            FitError::Extent { extent: cloth.extent(), unit: settings.unit, reach: measured.reach };
         return Err(diagnosed(&search, &cloth, settings).unwrap_or(too_large));
     }
     let source = settings.from_body.as_deref().map(|b| b.aligned(body, settings)).transpose()?;
     let (placement, mut doubts) = match &source {
         Some(source) => (source.placement, Vec::new()),
         None => {
-            let Verdict { placement, doubts } = place(&search, &cloth, extent, settings)?;
-            (placement, doubts.iter().map(ToString::to_string).collect())
+            let PlacementVerdict { placement, doubts, .. } = place(&search, &cloth, settings)?;
+            (placement, doubts)
         }
     };
     let metres = placement.unit.metres();
     let borders = settings.join_seams.map(|_| sheet.borders(&topology));
     let mut seams = finish_seams(&mut sheet, file, settings, metres);
-    let mesh = TriMesh::new(sheet.positions.clone(), sheet.faces.clone())
-        .map_err(|e| FitError::Mesh(e.to_string()))?;
-    let topology = Topology::new(&mesh);
+    let topology = Topology::new(&sheet.mesh()?);
     let placed = placement.apply(&sheet.positions);
     let (mut positions, from_body) = match &source {
         Some(source) => {
             let (carried, how) = source.carry(&sheet.positions, &sheet.faces, settings.category, body)?;
             (carried, Some(how))
         }
+        None if placement.has_limbs_at_rest() => (placed, None),
         None => {
-            let pose = LimbPose::of(body, &placement);
-            let straight = pose.to_t_pose(&placed, &sheet.faces, settings.category, body);
+            let cloth = SourceCloth { positions: &placed, faces: &sheet.faces, category: settings.category };
+            let straight = SameModel::posed(body, LimbPose::of(body, &placement))
+                .and_then(|posed| posed.carry(&cloth, body, POSE_BINDINGS));
             (straight.map_err(FitError::Mesh)?, None)
         }
     };
@@ -173,7 +170,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     if let Some(source) = &source {
         match search.believed_as_given(&raised, &FitSettings::default()) {
             Err(odd) => doubts.push(source.doubt(&odd)),
-            Ok(worn) if worn.piercing.arms > 0 => doubts.push(Doubt::Arms.to_string()),
+            Ok(worn) if worn.piercing.arms > 0 => doubts.push(ARMS_MISS.into()),
             Ok(_) => {}
         }
     }
@@ -188,14 +185,17 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
             metres,
         ));
     }
-    refuse_stray_pieces(&positions, &topology, search.surface(), &judge.worn_pieces(&Placement::AS_GIVEN))?;
     let rest_surface = search.surface();
+    let worn = judge.worn_pieces(&Placement::AS_GIVEN);
+    if let Some(piece) = stray_pieces(&positions, &topology, rest_surface, &worn).into_iter().next() {
+        return Err(FitError::StrayPiece { piece });
+    }
 
     turn_outward(&mut sheet, &positions, &topology, rest_surface);
     let follows = sheet.followed(file, metres);
     let before = contact(&positions, rest_surface);
     let unpushed = positions.clone();
-    push_out(&mut positions, &sheet.faces, rest_surface, CLEARANCE);
+    push_out(&mut positions, &sheet.faces, rest_surface, FIT_CLEARANCE);
     let share = stretched(&topology, &unpushed, &positions);
     if share > MOST_STRETCHED {
         take_or_refuse(settings.says_place(), FitError::Stretched { share }, &mut doubts)?;
@@ -205,7 +205,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let pushed = (0..moves.len()).filter(|v| moves[*v] > 0.0).map(|v| sheet.vertex_origin[v]).collect();
     sheet.note(RepairKind::PushedOut, Elements::Vertices(pushed));
 
-    let rest = TriMesh::new(positions, sheet.faces.clone()).map_err(|e| FitError::Mesh(e.to_string()))?;
+    let rest = mesh_of(positions, sheet.faces.clone())?;
     // Faces have been turned.
     let topology = Topology::new(&rest);
     let category = settings.category.unwrap_or_else(|| guessed(&rest, body, limbs));
@@ -216,6 +216,8 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let dropped_pieces =
         dropped_pieces.map(|p| MeshPiece { area: p.area * metres * metres, ..p.clone() }).collect();
     let file_faces = sheet.file_faces(file);
+    let mut pieces = MeshPiece::all(&rest, &topology);
+    pieces.sort_by(|a, b| b.area.total_cmp(&a.area));
     let report = FitReport {
         file_vertices: file.positions.len(),
         file_faces: file.polygon_count(),
@@ -227,7 +229,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         seams,
         dropped_pieces,
         unrepaired_edges: topology.non_manifold_edges.iter().map(of_file).collect(),
-        pieces: pieces(&rest, &topology),
+        pieces,
         category,
         holding,
         mesh: MeshMeasures::new(&rest, &topology),
@@ -253,11 +255,11 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
 }
 
 /// Where the garment belongs: legs that stand apart are looked for, and open seams taken as sewn, only if it is worn nowhere else.
-fn place(search: &Search, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Result<Verdict, FitError> {
-    let of = |cloth: &Cloth| verdict(&search.candidates(cloth, extent, settings), search, cloth, settings);
+fn place(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Result<PlacementVerdict, FitError> {
+    let of = |cloth: &Cloth| verdict(&search.candidates(cloth, settings), search, cloth, settings);
     let as_given = of(cloth);
     let is_worn = match &as_given {
-        Ok(verdict) => !verdict.is_odd(),
+        Ok(verdict) => !verdict.is_odd,
         Err(error) => !matches!(error, FitError::Implausible { .. } | FitError::OffTrunk { .. }),
     };
     if is_worn {
@@ -266,21 +268,21 @@ fn place(search: &Search, cloth: &Cloth, extent: f64, settings: &FitSettings) ->
     if settings.arms_lowered == Some(true) {
         // That says nothing about a garment that no arm passes through.
         let known = FitSettings { arms_lowered: None, ..settings.clone() };
-        let found = place(search, cloth, extent, &known);
+        let found = place(search, cloth, &known);
         let judge = search.judge(cloth, &known);
-        if let Some(verdict) = found.ok().filter(|v| !v.is_odd() && !judge.limbs(&v.placement).arms) {
+        if let Some(verdict) = found.ok().filter(|v| !v.is_odd && !judge.limbs(&v.placement).arms) {
             return Ok(verdict);
         }
     }
-    let apart = search.candidates_apart(cloth, extent, settings);
-    if let Some(verdict) = verdict(&apart, search, cloth, settings).ok().filter(|v| !v.is_odd()) {
+    let apart = search.candidates_apart(cloth, settings);
+    if let Some(verdict) = verdict(&apart, search, cloth, settings).ok().filter(|v| !v.is_odd) {
         return Ok(verdict);
     }
-    let sewn = join_seams(cloth.positions, cloth.faces, Some(SEAM * extent));
+    let sewn = join_seams(cloth.positions, cloth.faces, Some(SEAM_SHARE * cloth.extent()));
     if let Some(mesh) = sewn.and_then(|sewn| TriMesh::new(sewn.positions, sewn.faces).ok()) {
         let topology = Topology::new(&mesh);
         let sewn = of(&Cloth::new(mesh.positions(), mesh.faces(), &topology));
-        if let Some(verdict) = sewn.ok().filter(|v| !v.is_odd()) {
+        if let Some(verdict) = sewn.ok().filter(|v| !v.is_odd) {
             return Ok(verdict);
         }
     }
@@ -305,6 +307,7 @@ fn take_or_refuse(is_said: bool, error: FitError, doubts: &mut Vec<String>) -> R
     Ok(())
 }
 
+/// Refuses what reaches from the crown to the soles within 4 cm and to both hands within 10 cm.
 fn refuse_bodies(positions: &[[f64; 3]], body: &Body) -> Result<(), FitError> {
     let (low, high) = body.zero_body().bounds();
     let [lowest, highest] = bounds(positions);
@@ -313,20 +316,6 @@ fn refuse_bodies(positions: &[[f64; 3]], body: &Body) -> Result<(), FitError> {
         return Err(FitError::Body);
     }
     Ok(())
-}
-
-fn pieces(mesh: &TriMesh, topology: &Topology) -> Vec<MeshPiece> {
-    let empty = MeshPiece { vertices: 0, triangles: 0, area: 0.0, boundary_loops: 0 };
-    let mut pieces = vec![empty; topology.component_count];
-    let piece = |v: u32| topology.component_of_vertex[v as usize] as usize;
-    topology.component_of_vertex.iter().for_each(|c| pieces[*c as usize].vertices += 1);
-    for (f, face) in mesh.faces().iter().enumerate() {
-        pieces[piece(face[0])].triangles += 1;
-        pieces[piece(face[0])].area += mesh.face_area(f);
-    }
-    topology.boundary_loops.iter().for_each(|l| pieces[piece(l[0])].boundary_loops += 1);
-    pieces.sort_by(|a, b| b.area.total_cmp(&a.area));
-    pieces
 }
 
 #[cfg(test)]

@@ -6,11 +6,11 @@ use super::judge::{Candidate, Judge, UNWORN};
 use super::placement::Placement;
 
 /// A border deeper inside the body than this (m), for a larger share of its length, goes around nothing.
-const DEPTH: f64 = 0.012;
-const SHARE: f64 = 0.25;
+const RUNS_THROUGH_DEPTH: f64 = 0.012;
+const RUNS_THROUGH_SHARE: f64 = 0.25;
 
 /// A limb passes through openings longer than this (m): a child's wrist.
-const NARROWEST: f64 = 0.2;
+const NARROWEST_OPENING: f64 = 0.2;
 
 /// A border of a placed garment.
 struct Border {
@@ -20,6 +20,8 @@ struct Border {
     linked: Opening,
     /// Mean height (m).
     height: f64,
+    /// Connected piece that it belongs to.
+    piece: u32,
 }
 
 /// Which limbs pass through openings of their own.
@@ -44,7 +46,7 @@ impl Limbs {
 }
 
 /// What is not the trunk.
-const LIMBS: [Opening; 6] = [
+const AROUND_LIMBS: [Opening; 6] = [
     Opening::Neck,
     Opening::LeftArm,
     Opening::RightArm,
@@ -53,9 +55,19 @@ const LIMBS: [Opening; 6] = [
     Opening::Several,
 ];
 
-/// Whether a garment with this many openings around the trunk, and these others, is worn around it.
-fn goes_around(trunk: usize, has: &dyn Fn(Opening) -> bool) -> bool {
-    trunk >= 2 || (trunk > 0 && LIMBS.into_iter().any(has))
+/// Whether arms pass through openings of one piece, of more than two: two sleeves apart are socks, and a tube with no other
+/// opening has no room for head and legs.
+fn has_arms(borders: &[&Border]) -> bool {
+    let piece = |wanted| borders.iter().find(|b| b.opening == wanted).map(|b| b.piece);
+    let left = piece(Opening::LeftArm);
+    borders.len() > 2 && left.is_some() && left == piece(Opening::RightArm)
+}
+
+/// Whether a garment of these borders is worn around the trunk; an open shirt hangs from both arms.
+fn goes_around(borders: &[&Border]) -> bool {
+    let trunk = borders.iter().filter(|b| b.opening == Opening::Trunk).count();
+    let is_limb = |border: &&Border| AROUND_LIMBS.contains(&border.opening);
+    trunk >= 2 || (trunk > 0 && borders.iter().any(is_limb)) || has_arms(borders)
 }
 
 impl Judge<'_> {
@@ -65,12 +77,14 @@ impl Judge<'_> {
         let of_border = |border: usize| {
             let points = placement.apply(&self.cloth.border(border));
             let count = points.len().max(1) as f64;
-            let inside = points.iter().filter(|p| self.field.is_inside(**p, turn, DEPTH)).count();
+            let inside =
+                points.iter().filter(|p| self.field.is_inside(**p, turn, RUNS_THROUGH_DEPTH)).count();
             let linked = self.skeleton.opening(&points, turn);
             Border {
-                opening: if inside as f64 > SHARE * count { Opening::Nothing } else { linked },
+                opening: if inside as f64 > RUNS_THROUGH_SHARE * count { Opening::Nothing } else { linked },
                 linked,
                 height: points.iter().map(|p| p[1]).sum::<f64>() / count,
+                piece: self.cloth.piece(border),
             }
         };
         (0..self.cloth.borders.len()).map(of_border).collect()
@@ -89,31 +103,26 @@ impl Judge<'_> {
     /// Whether limbs pass through its openings, and which rim it hangs from; the candidate's score does not count that yet.
     pub fn with_openings(&self, mut candidate: Candidate) -> Candidate {
         let openings = self.openings(&candidate.placement);
+        let all: Vec<&Border> = openings.iter().collect();
         let count = |wanted: Opening| openings.iter().filter(|b| b.opening == wanted).count();
         let has = |wanted: Opening| count(wanted) > 0;
-        // Two sleeves that are not one piece are socks, and a tube with no other opening has no room for head and legs.
-        let piece =
-            |wanted: Opening| openings.iter().position(|b| b.opening == wanted).map(|b| self.cloth.piece(b));
-        let arms = openings.len() > 2
-            && has(Opening::LeftArm)
-            && piece(Opening::LeftArm) == piece(Opening::RightArm);
-        let is_around = goes_around(count(Opening::Trunk), &has) || arms;
+        let arms = has_arms(&all);
         // Only sleeves and armholes tell how arms hang.
-        let is_worn = is_around && (arms || candidate.placement.arm_angle_degrees == 0.0);
+        let is_worn = goes_around(&all) && (arms || candidate.placement.arm_angle_degrees == 0.0);
         if !is_worn {
             candidate.score -= UNWORN;
         }
         candidate.is_worn = is_worn;
-        candidate.worn_pieces = self.worn_alone(&openings).len();
+        candidate.worn_pieces = worn_alone(&openings).len();
         let longest = |wanted: Opening| {
             let of = openings.iter().zip(&self.cloth.border_lengths).filter(|(b, _)| b.linked == wanted);
             of.map(|(_, length)| *length).fold(0.0, f64::max)
         };
         let hem = longest(Opening::Trunk);
         candidate.neck_over_hem = if hem > 0.0 { longest(Opening::Neck) / hem } else { 0.0 };
-        candidate.is_tube = count(Opening::Trunk) == 2 && !LIMBS.into_iter().any(has);
+        candidate.is_tube = count(Opening::Trunk) == 2 && !AROUND_LIMBS.into_iter().any(has);
         let is_wide = |border: &usize| {
-            self.cloth.border_lengths[*border] * candidate.placement.unit.metres() > NARROWEST
+            self.cloth.border_lengths[*border] * candidate.placement.unit.metres() > NARROWEST_OPENING
         };
         let is_idle = |border: &usize| openings[*border].opening == Opening::Nothing && is_wide(border);
         candidate.idle_openings = (0..openings.len()).filter(is_idle).count();
@@ -128,22 +137,7 @@ impl Judge<'_> {
 
     /// Connected pieces that would be worn without the others.
     pub fn worn_pieces(&self, placement: &Placement) -> Vec<u32> {
-        self.worn_alone(&self.openings(placement))
-    }
-
-    fn worn_alone(&self, openings: &[Border]) -> Vec<u32> {
-        let mut pieces: Vec<u32> = (0..openings.len()).map(|border| self.cloth.piece(border)).collect();
-        pieces.sort_unstable();
-        pieces.dedup();
-        pieces.retain(|piece| {
-            let own = openings.iter().enumerate().filter(|(b, _)| self.cloth.piece(*b) == *piece);
-            let own: Vec<Opening> = own.map(|(_, border)| border.opening).collect();
-            let has = |wanted: Opening| own.contains(&wanted);
-            let trunk = own.iter().filter(|o| **o == Opening::Trunk).count();
-            // An open shirt hangs from both arms.
-            goes_around(trunk, &has) || own.len() > 2 && has(Opening::LeftArm) && has(Opening::RightArm)
-        });
-        pieces
+        worn_alone(&self.openings(placement))
     }
 
     /// How much lower the cloth ends in front of the spine than behind it, where it meets the middle plane of the body (m).
@@ -164,4 +158,16 @@ impl Judge<'_> {
         }
         tops[0] - tops[1]
     }
+}
+
+/// Connected pieces that would be worn without the others.
+fn worn_alone(borders: &[Border]) -> Vec<u32> {
+    let mut pieces: Vec<u32> = borders.iter().map(|border| border.piece).collect();
+    pieces.sort_unstable();
+    pieces.dedup();
+    pieces.retain(|piece| {
+        let own: Vec<&Border> = borders.iter().filter(|border| border.piece == *piece).collect();
+        goes_around(&own)
+    });
+    pieces
 }

@@ -1,15 +1,14 @@
 //! Whether every connected piece of a garment is on the body: what lies beside it intersects nothing, and looks like a good fit.
 
-use super::error::FitError;
-use clothcombo_physics::Topology;
-use clothcombo_physics::query::{Distance, Surface, VertexIndex};
-use rayon::prelude::*;
+use crate::mesh::gaps_to;
+use clothcombo_physics::query::VertexIndex;
+use clothcombo_physics::{Surface, Topology};
 use std::fmt;
 
 /// Cloth farther from the body, and from cloth that is on the body, than this does not touch it (m).
-const APART: f64 = 0.1;
+const TOUCH_REACH: f64 = 0.1;
 /// Least share of a piece's vertices that touch, if limbs pass through the openings of another one and not through its own.
-const TOUCHING: f64 = 0.5;
+const TOUCHING_SHARE: f64 = 0.5;
 
 /// A connected piece that is not on the body.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,11 +42,11 @@ impl fmt::Display for StrayPiece {
             1 => "it".to_owned(),
             _ => format!("one of its {pieces} pieces ({vertices} vertices, from vertex {first_vertex} on)"),
         };
-        match *distance > APART {
+        match *distance > TOUCH_REACH {
             true => write!(f, "{which} lies {distance:.2} m beside the body"),
             false => write!(
                 f,
-                "{which} lies beside the body: no limb passes through it, and most of it is farther than {APART} m"
+                "{which} lies beside the body: no limb passes through it, and most of it is farther than {TOUCH_REACH} m"
             ),
         }
     }
@@ -61,19 +60,16 @@ pub fn stray_pieces(
     body: &Surface<f64>,
     worn: &[u32],
 ) -> Vec<StrayPiece> {
-    // Built before it is shared.
-    body.closest_point();
-    let gap = |p: &[f64; 3]| body.gap(*p, Distance::ClosestPoint).gap;
-    let mut gaps: Vec<f64> = positions.par_iter().with_min_len(256).map(gap).collect();
+    let mut gaps = gaps_to(positions, body);
     let mut pieces: Vec<Vec<u32>> = vec![Vec::new(); topology.component_count];
     topology.component_of_vertex.iter().zip(0..).for_each(|(piece, v)| pieces[*piece as usize].push(v));
     pieces.retain(|piece| piece.len() > 1);
     let count = pieces.len();
     let is_on = |piece: &Vec<u32>, gaps: &[f64]| {
-        let touching = piece.iter().filter(|v| gaps[**v as usize] < APART).count();
+        let touching = piece.iter().filter(|v| gaps[**v as usize] < TOUCH_REACH).count();
         let is_worn = worn.contains(&topology.component_of_vertex[piece[0] as usize]);
         let is_panel = worn.is_empty();
-        touching > 0 && (is_worn || is_panel || touching as f64 >= TOUCHING * piece.len() as f64)
+        touching > 0 && (is_worn || is_panel || touching as f64 >= TOUCHING_SHARE * piece.len() as f64)
     };
     let own = gaps.clone();
     loop {
@@ -97,16 +93,4 @@ pub fn stray_pieces(
         }
         pieces = off;
     }
-}
-
-/// # Errors
-/// [`FitError::StrayPiece`] for the first piece that is not on the body.
-pub(super) fn refuse_stray_pieces(
-    positions: &[[f64; 3]],
-    topology: &Topology,
-    body: &Surface<f64>,
-    worn: &[u32],
-) -> Result<(), FitError> {
-    let stray = stray_pieces(positions, topology, body, worn).into_iter().next();
-    stray.map_or(Ok(()), |piece| Err(FitError::StrayPiece { piece }))
 }

@@ -14,7 +14,7 @@ use clothcombo_physics::{Topology, TriMesh};
 use std::fmt;
 
 /// A file is taken as it stands unless another place is better by this log-posterior.
-const MARGIN: f64 = 8.0;
+const BETTER_ELSEWHERE: f64 = 8.0;
 
 /// Tells which meshes lie on a body as they stand. The body is measured once, in a tenth of a second.
 pub struct PlacementCheck(SearchBody);
@@ -32,7 +32,7 @@ impl PlacementCheck {
     fn look<T>(&self, mesh: &TriMesh, body: &Body, look: impl FnOnce(&Search, &Cloth, &Judge) -> T) -> T {
         let topology = Topology::new(mesh);
         let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
-        let (search, settings) = (Search::new(body, &self.0), FitSettings::default());
+        let (search, settings) = (Search { body, measured: &self.0 }, FitSettings::default());
         look(&search, &cloth, &search.judge(&cloth, &settings))
     }
 
@@ -57,28 +57,22 @@ impl PlacementCheck {
     /// and fits nowhere clearly better, by the same judgement by which [`fit`](super::fit) takes a placement; and every
     /// piece of it has its faces outwards. `body` is the one that was measured.
     pub fn is_on_body(&self, mesh: &TriMesh, body: &Body) -> bool {
-        if mesh.face_count() < MIN_TRIANGLES {
-            return false;
-        }
-        let search = Search::new(body, &self.0);
-        let topology = Topology::new(mesh);
-        let outward = outward_area(mesh.positions(), mesh.faces(), &topology, search.surface());
-        if outward.into_iter().any(|area| area < 0.0) {
-            return false;
-        }
         let settings = FitSettings {
             unit: Some(Unit::M),
             up: Some(UpAxis::Y),
             arms_lowered: Some(false),
             ..FitSettings::default()
         };
-        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
-        if stray(&search, &cloth, &search.judge(&cloth, &settings)).is_some() {
-            return false;
-        }
-        let Ok(given) = search.believed_as_given(&cloth, &settings) else { return false };
-        let best = search.candidates(&cloth, mesh.extent(), &settings).first().map_or(f64::MIN, |c| c.score);
-        best <= given.score + MARGIN
+        let is_worn = |search: &Search, cloth: &Cloth, judge: &Judge| {
+            let outward = outward_area(cloth.positions, cloth.faces, cloth.topology, search.surface());
+            if outward.into_iter().any(|area| area < 0.0) || stray(search, cloth, judge).is_some() {
+                return false;
+            }
+            let Ok(given) = search.believed_as_given(cloth, &settings) else { return false };
+            let best = search.candidates(cloth, &settings).first().map_or(f64::MIN, |c| c.score);
+            best <= given.score + BETTER_ELSEWHERE
+        };
+        mesh.face_count() >= MIN_TRIANGLES && self.look(mesh, body, is_worn)
     }
 }
 

@@ -1,6 +1,5 @@
 //! How a file's coordinates become the body's: unit, up axis, facing, origin.
 
-use super::settings::FitSettings;
 use crate::asset::rotation::{self, Matrix3};
 use clothcombo_physics::vec3::{add, scale};
 use serde::Serialize;
@@ -8,10 +7,11 @@ use std::fmt;
 use std::str::FromStr;
 
 /// Length unit of a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Unit {
     /// Metre.
+    #[default]
     M,
     /// Decimetre.
     Dm,
@@ -29,36 +29,35 @@ impl Unit {
     /// All units.
     pub const ALL: [Self; 6] = [Self::M, Self::Dm, Self::Cm, Self::Mm, Self::Inch, Self::Foot];
 
+    /// Name, and metres per unit.
+    fn entry(self) -> (&'static str, f64) {
+        match self {
+            Self::M => ("m", 1.0),
+            Self::Dm => ("dm", 0.1),
+            Self::Cm => ("cm", 0.01),
+            Self::Mm => ("mm", 0.001),
+            Self::Inch => ("inch", 0.0254),
+            Self::Foot => ("foot", 0.3048),
+        }
+    }
+
     /// Metres per unit.
     pub fn metres(self) -> f64 {
-        match self {
-            Self::M => 1.0,
-            Self::Dm => 0.1,
-            Self::Cm => 0.01,
-            Self::Mm => 0.001,
-            Self::Inch => 0.0254,
-            Self::Foot => 0.3048,
-        }
+        self.entry().1
     }
 
     /// `m`, `dm`, `cm`, `mm`, `inch` or `foot`.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::M => "m",
-            Self::Dm => "dm",
-            Self::Cm => "cm",
-            Self::Mm => "mm",
-            Self::Inch => "inch",
-            Self::Foot => "foot",
-        }
+        self.entry().0
     }
 }
 
 /// The axis of a file that points up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UpAxis {
     /// As here.
+    #[default]
     Y,
     /// As in Blender, 3ds Max and CAD programs; −y faces forward.
     Z,
@@ -80,28 +79,26 @@ impl UpAxis {
     /// Those that are not.
     pub const DOWN: [Self; 3] = [Self::MinusY, Self::MinusZ, Self::MinusX];
 
+    /// Name, and the rotation that turns this axis up.
+    fn entry(self) -> (&'static str, Matrix3) {
+        match self {
+            Self::Y => ("y", rotation::IDENTITY),
+            Self::Z => ("z", [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+            Self::X => ("x", [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+            Self::MinusY => ("-y", [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]),
+            Self::MinusZ => ("-z", [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+            Self::MinusX => ("-x", [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+        }
+    }
+
     /// The rotation that turns this axis up.
     pub fn to_y_up(self) -> Matrix3 {
-        match self {
-            Self::Y => rotation::IDENTITY,
-            Self::Z => [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
-            Self::X => [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
-            Self::MinusY => [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]],
-            Self::MinusZ => [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
-            Self::MinusX => [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
-        }
+        self.entry().1
     }
 
     /// `y`, `z`, `x`, `-y`, `-z` or `-x`.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Y => "y",
-            Self::Z => "z",
-            Self::X => "x",
-            Self::MinusY => "-y",
-            Self::MinusZ => "-z",
-            Self::MinusX => "-x",
-        }
+        self.entry().0
     }
 }
 
@@ -130,10 +127,11 @@ named!(Unit, "unit");
 named!(UpAxis, "up axis");
 
 /// Where the origin of the file was taken to be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Origin {
+pub enum FileOrigin {
     /// At the pelvis joint, as here.
+    #[default]
     Pelvis,
     /// On the floor below the pelvis.
     Floor,
@@ -143,8 +141,8 @@ pub enum Origin {
     SourceBody,
 }
 
-/// The similarity that brings a file onto the body: `p ↦ metres · R · p + translation`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// The similarity that brings a file onto the body: `p ↦ metres · R · p + translation`. The default is [`Self::AS_GIVEN`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Placement {
     /// Unit of the file.
     pub unit: Unit,
@@ -153,7 +151,7 @@ pub struct Placement {
     /// Turn about the vertical after the up axis (degrees, counter-clockwise seen from above).
     pub turn_degrees: f64,
     /// Where the file's origin is.
-    pub origin: Origin,
+    pub origin: FileOrigin,
     /// Translation after scaling and turning (m).
     pub translation: [f64; 3],
     /// How far the arms of the garment hang below the horizontal (degrees); 0 is a T-pose.
@@ -168,47 +166,11 @@ impl Placement {
         unit: Unit::M,
         up: UpAxis::Y,
         turn_degrees: 0.0,
-        origin: Origin::Pelvis,
+        origin: FileOrigin::Pelvis,
         translation: [0.0; 3],
         arm_angle_degrees: 0.0,
         leg_angle_degrees: 0.0,
     };
-
-    /// Logarithm of how usual such a file is, up to a constant; what `settings` say has no say.
-    pub(super) fn log_prior(&self, settings: &FitSettings) -> f64 {
-        let unit = match (settings.unit, self.unit) {
-            (Some(_), _) | (_, Unit::M) => 0.0,
-            (_, Unit::Cm | Unit::Mm) => -0.5,
-            _ => -2.0,
-        };
-        let up = match (settings.up, self.up) {
-            (Some(_), _) | (_, UpAxis::Y) => 0.0,
-            (_, UpAxis::Z) => -0.5,
-            _ => -2.0,
-        };
-        let turn = match (settings.turn_degrees, self.turn_degrees) {
-            (Some(_), _) | (_, 0.0) => 0.0,
-            // Back to front is the least usual one.
-            (_, 180.0) => -5.0,
-            _ => -2.0,
-        };
-        let arms = match settings.arms_lowered {
-            None if self.arm_angle_degrees != 0.0 => -1.5,
-            _ => 0.0,
-        };
-        let legs = match settings.legs_degrees {
-            None if self.leg_angle_degrees != 0.0 => -1.5,
-            _ => 0.0,
-        };
-        let origin = match (settings.offset, self.origin) {
-            (Some(_), _) | (_, Origin::Pelvis) => 0.0,
-            (_, Origin::Floor) => -0.5,
-            // A place known to a centimetre or two in each direction, of a metre: three free numbers fit a little
-            // better anywhere.
-            _ => -12.0,
-        };
-        unit + up + turn + arms + legs + origin
-    }
 
     /// In words, short: what a reader compares.
     pub(super) fn reading(&self) -> String {
@@ -225,6 +187,11 @@ impl Placement {
             "unit {}, up {}, turned {}°, {arms}{legs}, origin at {x:.3}, {y:.3}, {z:.3} m",
             self.unit, self.up, self.turn_degrees
         )
+    }
+
+    /// Whether arms and legs are where the body has them at rest.
+    pub(super) fn has_limbs_at_rest(&self) -> bool {
+        (self.arm_angle_degrees, self.leg_angle_degrees) == (0.0, 0.0)
     }
 
     /// The turn without scale and translation.
@@ -258,7 +225,7 @@ mod tests {
                     unit: Unit::Cm,
                     up,
                     turn_degrees,
-                    origin: Origin::Pelvis,
+                    origin: FileOrigin::Pelvis,
                     ..Placement::AS_GIVEN
                 };
                 let m = placement.turn();

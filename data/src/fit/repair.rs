@@ -3,8 +3,8 @@
 
 use super::error::FitError;
 use super::report::{Elements, MeshPiece, RepairKind, SeamReport};
-use super::settings::{FitSettings, Keep, MAX_VERTICES, MIN_TRIANGLES};
-use super::sheet::{Corner, Sheet, SheetBorder};
+use super::settings::{FitSettings, Keep, MAX_GARMENT_VERTICES, MIN_TRIANGLES};
+use super::sheet::{Corner, RepairSheet};
 use crate::format::PolygonMesh;
 use crate::mesh::{
     AREA_SHARE, JoinedSheet, Seam, WELD_SHARE, clean_faces, diagonal, join_faces, join_seams, open_seams,
@@ -19,7 +19,7 @@ const OPEN_GAP: f64 = 0.01;
 /// They are at least this long (m).
 const OPEN_LENGTH: f64 = 0.06;
 /// A vertex whose shortest edge is this many times the median one does not belong to the mesh.
-const FAR: f64 = 20.0;
+const FAR_EDGES: f64 = 20.0;
 /// Most such vertices.
 const MOST_FAR: usize = 8;
 /// The outer sheet of cloth with thickness has from one to the other share of the area.
@@ -27,15 +27,14 @@ const OUTER_SHARE: [f64; 2] = [0.3, 0.7];
 
 /// Everything that needs neither body nor unit: weld, triangulate, drop, cut, orient each piece; keep what is asked for; join
 /// borders that coincide.
-pub(super) fn repair(file: &PolygonMesh, settings: &FitSettings) -> Result<Sheet, FitError> {
+pub(super) fn repair(file: &PolygonMesh, settings: &FitSettings) -> Result<RepairSheet, FitError> {
     let mut sheet = manifold(file)?;
+    if settings.keep == Keep::Largest {
+        keep_largest(&mut sheet, file);
+    }
     match settings.keep {
-        Keep::All => refuse_thickness(&sheet)?,
-        Keep::Largest => {
-            keep_largest(&mut sheet, file);
-            refuse_thickness(&sheet)?;
-        }
         Keep::Outer => keep_outer(&mut sheet, file)?,
+        Keep::All | Keep::Largest => refuse_thickness(&sheet)?,
     }
     if sheet.faces.len() < MIN_TRIANGLES {
         return Err(FitError::TooFewTriangles { triangles: sheet.faces.len() });
@@ -55,18 +54,14 @@ pub(crate) fn is_double(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> bool {
     thickness(positions, faces).or_else(|| sheets(positions, faces)).is_some()
 }
 
-fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
-    let mut cut = triangulate(&file.positions, file.polygons());
+fn manifold(file: &PolygonMesh) -> Result<RepairSheet, FitError> {
+    let cut = triangulate(&file.positions, file.polygons());
     let far = far_vertices(&file.positions, &cut.faces);
-    let stays: Vec<bool> =
-        cut.faces.iter().map(|f| f.iter().all(|v| far.binary_search(v).is_err())).collect();
-    let of_stays = || stays.iter().copied();
-    cut.faces = kept(cut.faces, of_stays());
-    cut.corners = kept(cut.corners, of_stays());
-    cut.polygon = kept(cut.polygon, of_stays());
+    let is_near = |v: &u32| far.binary_search(v).is_err();
+    let stays: Vec<usize> = (0..cut.faces.len()).filter(|f| cut.faces[*f].iter().all(is_near)).collect();
     let mut used = vec![false; file.positions.len()];
-    let of_faces = cut.faces.iter().flatten().chain(file.polygons().flatten());
-    of_faces.filter(|v| far.binary_search(v).is_err()).for_each(|v| used[*v as usize] = true);
+    let of_faces = stays.iter().flat_map(|f| &cut.faces[*f]).chain(file.polygons().flatten());
+    of_faces.filter(|v| is_near(v)).for_each(|v| used[*v as usize] = true);
     let used_vertices: Vec<u32> = (0..used.len() as u32).filter(|v| used[*v as usize]).collect();
     let used_positions: Vec<[f64; 3]> = used_vertices.iter().map(|v| file.positions[*v as usize]).collect();
     let diagonal = diagonal(&used_positions);
@@ -74,29 +69,40 @@ fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
         return Err(FitError::TooFewTriangles { triangles: 0 });
     }
     let welded = weld(&used_positions, WELD_SHARE * diagonal);
-    if welded.positions.len() > MAX_VERTICES {
+    if welded.positions.len() > MAX_GARMENT_VERTICES {
         return Err(FitError::TooManyVertices { vertices: welded.positions.len() });
     }
     let mut compact = vec![u32::MAX; file.positions.len()];
     used_vertices.iter().zip(&welded.number).for_each(|(v, w)| compact[*v as usize] = *w);
 
-    let renumbered: Vec<[u32; 3]> = cut.faces.iter().map(|f| f.map(|v| compact[v as usize])).collect();
+    let renumbered: Vec<[u32; 3]> =
+        stays.iter().map(|f| cut.faces[*f].map(|v| compact[v as usize])).collect();
     let clean = clean_faces(&welded.positions, &renumbered, AREA_SHARE * diagonal * diagonal);
     if clean.kept.len() < MIN_TRIANGLES {
         return Err(FitError::TooFewTriangles { triangles: clean.kept.len() });
     }
     let faces: Vec<[u32; 3]> = clean.kept.iter().map(|f| renumbered[*f as usize]).collect();
-    let corners = clean.kept.iter().map(|f| cut.corners[*f as usize].map(Corner::own)).collect();
-    let face_origin = clean.kept.iter().map(|f| cut.polygon[*f as usize]).collect();
-    let mut sheet = Sheet::new(welded.positions, faces, face_origin, corners, compact);
+    let corners = clean.kept.iter().map(|f| cut.corners[stays[*f as usize]].map(Corner::own)).collect();
+    let of_polygons = |list: &[u32]| list.iter().map(|f| cut.polygon[stays[*f as usize]]).collect();
+    let face_origin = of_polygons(&clean.kept);
+    let turned = vec![false; faces.len()];
+    let positions = welded.positions;
+    let mut sheet = RepairSheet {
+        positions,
+        faces,
+        face_origin,
+        corners,
+        turned,
+        welded: compact,
+        ..RepairSheet::default()
+    };
     let made = oriented(&mut sheet);
 
     let file_vertex = |w: u32| used_vertices[welded.origin[w as usize] as usize];
     let mut kept = vec![0u8; welded.origin.len()];
     made.origin.iter().for_each(|w| kept[*w as usize] = kept[*w as usize].saturating_add(1));
     let of_file = |e: &[u32; 2]| e.map(file_vertex);
-    let is_unused = |v: &u32| !used[*v as usize] && far.binary_search(v).is_err();
-    let unused = (0..used.len() as u32).filter(is_unused);
+    let unused = (0..used.len() as u32).filter(|v| !used[*v as usize] && is_near(v));
     let lost = (0..kept.len() as u32).filter(|w| kept[*w as usize] == 0).map(file_vertex);
     sheet.note(RepairKind::DroppedFarVertices, Elements::Vertices(far.clone()));
     sheet.note(RepairKind::DroppedIsolatedVertices, Elements::Vertices(unused.chain(lost).collect()));
@@ -104,9 +110,8 @@ fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
     sheet.note(RepairKind::WeldedVertices, Elements::Vertices(merged));
     let large = file.polygons().enumerate().filter(|(_, p)| p.len() > 3).map(|(i, _)| i as u32).collect();
     sheet.note(RepairKind::TriangulatedFaces, Elements::Faces(large));
-    let polygons = |list: &[u32]| Elements::Faces(list.iter().map(|f| cut.polygon[*f as usize]).collect());
-    sheet.note(RepairKind::DroppedDegenerateFaces, polygons(&clean.degenerate));
-    sheet.note(RepairKind::DroppedRepeatedFaces, polygons(&clean.repeated));
+    sheet.note(RepairKind::DroppedDegenerateFaces, Elements::Faces(of_polygons(&clean.degenerate)));
+    sheet.note(RepairKind::DroppedRepeatedFaces, Elements::Faces(of_polygons(&clean.repeated)));
     let edges = |list: &[[u32; 2]]| Elements::Edges(list.iter().map(of_file).collect());
     sheet.note(RepairKind::CutNonManifoldEdges, edges(&made.crowded));
     sheet.note(RepairKind::CutOneSidedEdges, edges(&made.twisted));
@@ -119,11 +124,7 @@ fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
     Ok(sheet)
 }
 
-fn kept<T>(all: Vec<T>, stays: impl Iterator<Item = bool>) -> Vec<T> {
-    all.into_iter().zip(stays).filter_map(|(x, stays)| stays.then_some(x)).collect()
-}
-
-/// Vertices that no edge joins to the rest within [`FAR`] median edges, ascending: slips of a modelling program. Where there are
+/// Vertices that no edge joins to the rest within [`FAR_EDGES`] median edges, ascending: slips of a modelling program. Where there are
 /// more than a few, the mesh is coarse instead.
 fn far_vertices(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<u32> {
     let mut shortest = vec![f64::INFINITY; positions.len()];
@@ -139,7 +140,7 @@ fn far_vertices(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<u32> {
     }
     lengths.sort_by(f64::total_cmp);
     let Some(median) = lengths.get(lengths.len() / 2) else { return Vec::new() };
-    let is_far = |v: &u32| (FAR * median..f64::INFINITY).contains(&shortest[*v as usize]);
+    let is_far = |v: &u32| (FAR_EDGES * median..f64::INFINITY).contains(&shortest[*v as usize]);
     let far: Vec<u32> = (0..positions.len() as u32).filter(is_far).collect();
     if far.len() > MOST_FAR { Vec::new() } else { far }
 }
@@ -152,7 +153,7 @@ struct Oriented {
 }
 
 /// Cuts where more than two faces meet, gives each piece one direction and vertices of its own.
-fn oriented(sheet: &mut Sheet) -> Oriented {
+fn oriented(sheet: &mut RepairSheet) -> Oriented {
     let (joined, crowded) = join_faces(&sheet.positions, &sheet.faces);
     for f in orient(&mut sheet.faces, &joined) {
         sheet.corners[f as usize].swap(1, 2);
@@ -163,24 +164,20 @@ fn oriented(sheet: &mut Sheet) -> Oriented {
     Oriented { origin: split.origin, crowded, twisted: split.twisted }
 }
 
-fn refuse_thickness(sheet: &Sheet) -> Result<(), FitError> {
-    match thickness(&sheet.positions, &sheet.outward_faces()) {
-        Some(thickness) => {
-            let share = thickness / diagonal(&sheet.positions);
-            Err(FitError::Thickness { thickness, share })
-        }
-        None => match sheets(&sheet.positions, &sheet.faces) {
-            Some(distance) => {
-                Err(FitError::Sheets { distance, share: distance / diagonal(&sheet.positions) })
-            }
-            None => Ok(()),
-        },
+fn refuse_thickness(sheet: &RepairSheet) -> Result<(), FitError> {
+    let share = |distance: f64| distance / diagonal(&sheet.positions);
+    if let Some(thickness) = thickness(&sheet.positions, &sheet.outward_faces()) {
+        return Err(FitError::Thickness { thickness, share: share(thickness) });
+    }
+    match sheets(&sheet.positions, &sheet.faces) {
+        Some(distance) => Err(FitError::Sheets { distance, share: share(distance) }),
+        None => Ok(()),
     }
 }
 
 /// Keeps the outer sheet of cloth with thickness, or the larger one of two pieces that lie in each other; cloth without either
 /// stays as it is.
-fn keep_outer(sheet: &mut Sheet, file: &PolygonMesh) -> Result<(), FitError> {
+fn keep_outer(sheet: &mut RepairSheet, file: &PolygonMesh) -> Result<(), FitError> {
     let faces = sheet.outward_faces();
     if thickness(&sheet.positions, &faces).is_none() {
         if sheets(&sheet.positions, &faces).is_some() {
@@ -191,9 +188,10 @@ fn keep_outer(sheet: &mut Sheet, file: &PolygonMesh) -> Result<(), FitError> {
     let outer = outer_sheet(&sheet.positions, &faces);
     let mut is_outer = vec![false; faces.len()];
     outer.iter().for_each(|f| is_outer[*f as usize] = true);
-    let area = |list: &mut dyn Iterator<Item = usize>| list.map(|f| sheet.area(f)).sum::<f64>();
-    let all = area(&mut (0..faces.len()));
-    let kept = area(&mut (0..faces.len()).filter(|f| is_outer[*f]));
+    let areas: Vec<f64> = (0..faces.len()).map(|f| sheet.area(f)).collect();
+    let all: f64 = areas.iter().sum();
+    let kept: f64 =
+        areas.iter().zip(&is_outer).filter(|(_, is_outer)| **is_outer).map(|(area, _)| area).sum();
     if !(OUTER_SHARE[0] * all..=OUTER_SHARE[1] * all).contains(&kept) {
         return Err(FitError::MixedSheets);
     }
@@ -203,21 +201,23 @@ fn keep_outer(sheet: &mut Sheet, file: &PolygonMesh) -> Result<(), FitError> {
 }
 
 /// Keeps the connected piece with the largest area and lists the others.
-fn keep_largest(sheet: &mut Sheet, file: &PolygonMesh) {
-    let (pieces, piece_of_face) = sheet.pieces();
+fn keep_largest(sheet: &mut RepairSheet, file: &PolygonMesh) {
+    let Ok(mesh) = sheet.mesh() else { return };
+    let topology = Topology::new(&mesh);
+    let mut pieces = MeshPiece::all(&mesh, &topology);
     let Some(largest) = (0..pieces.len()).max_by(|a, b| pieces[*a].area.total_cmp(&pieces[*b].area)) else {
         return;
     };
-    let mut others: Vec<MeshPiece> =
-        pieces.into_iter().enumerate().filter(|(number, _)| *number != largest).map(|(_, p)| p).collect();
-    others.sort_by(|a, b| b.area.total_cmp(&a.area));
-    let dropped = sheet.drop_faces(|f| piece_of_face[f] == largest, file);
+    let piece = |f: usize| topology.component_of_vertex[mesh.faces()[f][0] as usize] as usize;
+    let dropped = sheet.drop_faces(|f| piece(f) == largest, file);
     sheet.note(RepairKind::DroppedPieces, Elements::Faces(dropped));
-    sheet.dropped_pieces = others;
+    pieces.remove(largest);
+    pieces.sort_by(|a, b| b.area.total_cmp(&a.area));
+    sheet.dropped_pieces = pieces;
 }
 
 /// Joins borders within `reach` (in the file's unit), without it those that coincide.
-fn join(sheet: &mut Sheet, file: &PolygonMesh, reach: Option<f64>) {
+fn join(sheet: &mut RepairSheet, file: &PolygonMesh, reach: Option<f64>) {
     let Some(joined) = join_seams(&sheet.positions, &sheet.faces, reach) else { return };
     let JoinedSheet { positions, faces, parent, became, seams } = joined;
     let touched: Vec<u32> = (0..became.len() as u32).filter(|v| became[*v as usize] != *v).collect();
@@ -234,7 +234,7 @@ fn join(sheet: &mut Sheet, file: &PolygonMesh, reach: Option<f64>) {
 /// What needs the unit: joins borders within the distance that is asked for and lists the seams that stay open. `metres` of
 /// the file's unit.
 pub(super) fn finish_seams(
-    sheet: &mut Sheet,
+    sheet: &mut RepairSheet,
     file: &PolygonMesh,
     settings: &FitSettings,
     metres: f64,
@@ -249,21 +249,19 @@ pub(super) fn finish_seams(
 
 /// Borders that are not among those of `before` and that no limb passes through: gaps in seams that were joined.
 pub(super) fn gaps(
-    borders: &[SheetBorder],
-    before: &[SheetBorder],
+    borders: &[(Vec<u32>, Seam)],
+    before: &[(Vec<u32>, Seam)],
     is_linked: &[bool],
     metres: f64,
 ) -> Vec<SeamReport> {
-    let is_gap = |(border, is_linked): &(&SheetBorder, &bool)| {
-        !**is_linked && before.iter().all(|known| known.vertices != border.vertices)
-    };
-    let gaps = borders.iter().zip(is_linked).filter(is_gap);
-    gaps.map(|(gap, _)| SeamReport::new(&gap.as_seam(), metres, false)).collect()
+    let unlinked = borders.iter().zip(is_linked).filter(|(_, is_linked)| !**is_linked);
+    let gaps = unlinked.filter(|((vertices, _), _)| before.iter().all(|(known, _)| known != vertices));
+    gaps.map(|((_, seam), _)| SeamReport::new(seam, metres, false)).collect()
 }
 
 /// Turns every piece whose area faces the body more than away from it, and reports all faces that differ from the file.
 pub(super) fn turn_outward(
-    sheet: &mut Sheet,
+    sheet: &mut RepairSheet,
     positions: &[[f64; 3]],
     topology: &Topology,
     body: &Surface<f64>,
@@ -281,11 +279,10 @@ pub(super) fn turn_outward(
     sheet.note(RepairKind::TurnedFaces, Elements::Faces(turned));
 }
 
-impl Sheet {
+impl RepairSheet {
     /// Faces with their front outside where they enclose something: behind them is the cloth.
     fn outward_faces(&self) -> Vec<[u32; 3]> {
-        let mesh = TriMesh::new(self.positions.clone(), self.faces.clone());
-        match mesh.is_ok_and(|mesh| is_inside_out(&mesh)) {
+        match self.mesh().is_ok_and(|mesh| is_inside_out(&mesh)) {
             true => self.faces.iter().map(|[a, b, c]| [*a, *c, *b]).collect(),
             false => self.faces.clone(),
         }

@@ -1,15 +1,11 @@
 //! What fitting assumed and changed, element by element.
 
-mod seams;
-
-pub use seams::SeamReport;
-
 use super::from_body::SourcePlacement;
-use super::placement::{Origin, Placement};
+use super::placement::{FileOrigin, Placement};
 use super::sitting::Sitting;
 use crate::asset::Category;
-use crate::mesh::MeshMeasures;
-use seams::write_seams;
+use crate::mesh::{MeshMeasures, Seam};
+use clothcombo_physics::{Topology, TriMesh};
 use serde::Serialize;
 use std::fmt;
 
@@ -98,15 +94,19 @@ impl Elements {
 
 impl fmt::Display for Elements {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const SHOWN: usize = 8;
+        const SHOWN_ELEMENTS: usize = 8;
         let (what, shown): (_, Vec<String>) = match self {
-            Self::Vertices(list) => ("vertex", list.iter().take(SHOWN).map(u32::to_string).collect()),
-            Self::Faces(list) => ("face", list.iter().take(SHOWN).map(u32::to_string).collect()),
-            Self::Edges(list) => ("edge", list.iter().take(SHOWN).map(|[a, b]| format!("{a}–{b}")).collect()),
+            Self::Vertices(list) => {
+                ("vertex", list.iter().take(SHOWN_ELEMENTS).map(u32::to_string).collect())
+            }
+            Self::Faces(list) => ("face", list.iter().take(SHOWN_ELEMENTS).map(u32::to_string).collect()),
+            Self::Edges(list) => {
+                ("edge", list.iter().take(SHOWN_ELEMENTS).map(|[a, b]| format!("{a}–{b}")).collect())
+            }
         };
         write!(f, "{what} {}", shown.join(", "))?;
         match self.len() {
-            n if n > SHOWN => write!(f, " and {} more", n - SHOWN),
+            n if n > SHOWN_ELEMENTS => write!(f, " and {} more", n - SHOWN_ELEMENTS),
             _ => Ok(()),
         }
     }
@@ -136,6 +136,22 @@ pub struct MeshPiece {
     pub boundary_loops: usize,
 }
 
+impl MeshPiece {
+    /// All connected pieces of a mesh, by their number in `topology`.
+    pub(super) fn all(mesh: &TriMesh, topology: &Topology) -> Vec<Self> {
+        let empty = Self { vertices: 0, triangles: 0, area: 0.0, boundary_loops: 0 };
+        let mut pieces = vec![empty; topology.component_count];
+        let piece = |v: u32| topology.component_of_vertex[v as usize] as usize;
+        topology.component_of_vertex.iter().for_each(|c| pieces[*c as usize].vertices += 1);
+        for (f, face) in mesh.faces().iter().enumerate() {
+            pieces[piece(face[0])].triangles += 1;
+            pieces[piece(face[0])].area += mesh.face_area(f);
+        }
+        topology.boundary_loops.iter().for_each(|l| pieces[piece(l[0])].boundary_loops += 1);
+        pieces
+    }
+}
+
 impl fmt::Display for MeshPiece {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { vertices, triangles, area, boundary_loops } = self;
@@ -145,6 +161,30 @@ impl fmt::Display for MeshPiece {
             1 => write!(f, "1 boundary loop"),
             n => write!(f, "{n} boundary loops"),
         }
+    }
+}
+
+/// Two borders of the file that run along each other.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SeamReport {
+    /// Whether they were joined.
+    pub joined: bool,
+    /// Length (mm).
+    pub length_mm: f64,
+    /// Median distance between the borders (mm).
+    pub gap_mm: f64,
+    /// Largest distance between them (mm).
+    pub widest_mm: f64,
+    /// First and last vertex of one of the borders in the file, counted from 0.
+    pub vertices: [u32; 2],
+}
+
+impl SeamReport {
+    /// `metres` of the file's unit; the ends are vertices of the file.
+    pub(super) fn new(seam: &Seam, metres: f64, joined: bool) -> Self {
+        let [length_mm, gap_mm, widest_mm] =
+            [seam.length, seam.gap, seam.widest].map(|length| 1e3 * metres * length);
+        Self { joined, length_mm, gap_mm, widest_mm, vertices: seam.ends }
     }
 }
 
@@ -174,6 +214,15 @@ pub fn contact_warnings(inside: usize, body_pairs: usize, self_pairs: usize) -> 
     let own = || format!("{self_pairs} self-intersecting triangle pairs");
     let of_body = (inside > 0 || body_pairs > 0).then(body);
     of_body.into_iter().chain((self_pairs > 0).then(own)).collect()
+}
+
+/// What speaks against a file of which this many connected pieces are worn on their own.
+pub fn outfit_warning(worn_pieces: usize) -> Option<String> {
+    (worn_pieces > 1).then(|| {
+        format!(
+            "{worn_pieces} of its pieces would be worn without the others: for an outfit, export one file per garment"
+        )
+    })
 }
 
 /// Everything that was assumed, repaired and measured.
@@ -244,12 +293,12 @@ impl FitReport {
         let p = &self.placement;
         let [x, y, z] = p.translation.map(|t| 1e3 * t);
         let origin = match p.origin {
-            Origin::Pelvis => "the file's origin is the pelvis of the body".to_string(),
-            Origin::Floor => {
+            FileOrigin::Pelvis => "the file's origin is the pelvis of the body".to_string(),
+            FileOrigin::Floor => {
                 format!("the file's origin is on the floor below the pelvis (moved by {y:.0} mm)")
             }
-            Origin::SourceBody => self.from_body.as_ref().map(SourcePlacement::text).unwrap_or_default(),
-            Origin::Elsewhere => {
+            FileOrigin::SourceBody => self.from_body.as_ref().map(SourcePlacement::text).unwrap_or_default(),
+            FileOrigin::Elsewhere => {
                 format!("the file's origin is not the body's: moved by {x:.0}, {y:.0}, {z:.0} mm")
             }
         };
@@ -324,5 +373,37 @@ impl fmt::Display for FitReport {
             c.self_triangle_pairs
         )?;
         write!(f, "holding   {}", if self.holding { "yes: it lies below the collarbone" } else { "no" })
+    }
+}
+
+/// Seams in the report: how many of them are named one by one.
+const SHOWN_SEAMS: usize = 8;
+
+/// The joined or the open ones of `seams` in words; nothing if there are none.
+fn write_seams(f: &mut fmt::Formatter<'_>, seams: &[SeamReport], joined: bool) -> fmt::Result {
+    let found: Vec<&SeamReport> = seams.iter().filter(|seam| seam.joined == joined).collect();
+    if found.is_empty() {
+        return Ok(());
+    }
+    let count = if found.len() == 1 { "1 seam".to_owned() } else { format!("{} seams", found.len()) };
+    let (head, verb) = if joined { ("repaired  joined", "ran") } else { ("open     ", "run") };
+    writeln!(f, "{head} {count}: borders that {verb} along each other")?;
+    for seam in found.iter().take(SHOWN_SEAMS) {
+        let [first, last] = seam.vertices;
+        writeln!(
+            f,
+            "          {:.0} mm long, {:.2} mm apart, between vertices {first} and {last}",
+            seam.length_mm, seam.gap_mm
+        )?;
+    }
+    if found.len() > SHOWN_SEAMS {
+        writeln!(f, "          and {} more", found.len() - SHOWN_SEAMS)?;
+    }
+    let widest = found.iter().map(|seam| seam.widest_mm).fold(0.0, f64::max);
+    match joined {
+        true => Ok(()),
+        false => {
+            writeln!(f, "          join them with --join-seams {:.0}mm", (1.05 * widest).ceil().max(1.0))
+        }
     }
 }

@@ -1,13 +1,13 @@
 //! What is known about a file, and the limits of what fits.
 
 use super::from_body::SourceBody;
-use super::placement::{Unit, UpAxis};
+use super::placement::{FileOrigin, Placement, Unit, UpAxis};
 use crate::asset::Category;
 use std::str::FromStr;
 use std::sync::Arc;
 
 /// Most vertices a garment may have after welding.
-pub const MAX_VERTICES: usize = 1_000_000;
+pub const MAX_GARMENT_VERTICES: usize = 1_000_000;
 
 /// What is left longer than this many times its length by the push out of the body is stretched.
 pub(super) const MOST_STRETCH: f64 = 1.5;
@@ -50,6 +50,54 @@ impl FitSettings {
     pub(super) fn says_place(&self) -> bool {
         let of_the_file = self.unit.is_some() || self.up.is_some() || self.category.is_some();
         of_the_file || self.arms_lowered.is_some() || self.legs_degrees.is_some() || self.is_placed()
+    }
+
+    /// Up axes that are looked for.
+    pub(super) fn ups(&self) -> Vec<UpAxis> {
+        self.up.map_or(UpAxis::USUAL.to_vec(), |up| vec![up])
+    }
+
+    /// Turns about the vertical that are looked for (degrees).
+    pub(super) fn turns(&self) -> Vec<f64> {
+        self.turn_degrees.map_or(vec![0.0, 90.0, 180.0, 270.0], |turn| vec![turn])
+    }
+
+    /// Logarithm of how usual a file of this placement is, up to a constant; what is said has no say.
+    pub(super) fn log_prior(&self, placement: &Placement) -> f64 {
+        let unit = match placement.unit {
+            Unit::M => 0.0,
+            Unit::Cm | Unit::Mm => -0.5,
+            _ => -2.0,
+        };
+        let up = match placement.up {
+            UpAxis::Y => 0.0,
+            UpAxis::Z => -0.5,
+            _ => -2.0,
+        };
+        let turn = match placement.turn_degrees {
+            0.0 => 0.0,
+            // Back to front is the least usual one.
+            180.0 => -5.0,
+            _ => -2.0,
+        };
+        let arms = if placement.arm_angle_degrees == 0.0 { 0.0 } else { -1.5 };
+        let legs = if placement.leg_angle_degrees == 0.0 { 0.0 } else { -1.5 };
+        let origin = match placement.origin {
+            FileOrigin::Pelvis => 0.0,
+            FileOrigin::Floor => -0.5,
+            // A place known to a centimetre or two in each direction, of a metre: three free numbers fit a little
+            // better anywhere.
+            _ => -12.0,
+        };
+        let found_out = [
+            (self.unit.is_none(), unit),
+            (self.up.is_none(), up),
+            (self.turn_degrees.is_none(), turn),
+            (self.arms_lowered.is_none(), arms),
+            (self.legs_degrees.is_none(), legs),
+            (self.offset.is_none(), origin),
+        ];
+        found_out.iter().map(|(is_found_out, log)| if *is_found_out { *log } else { 0.0 }).sum()
     }
 
     /// Whether they say where a garment belongs: such a garment is never taken where it lies.

@@ -1,5 +1,6 @@
 //! Triangles of a file while they are repaired: every vertex, face and corner knows what of the file it was.
 
+use super::error::FitError;
 use super::report::{Elements, MeshPiece, Repair, RepairKind};
 use crate::format::{FileFace, PolygonMesh};
 use crate::mesh::{Attachment, Seam, attach};
@@ -22,25 +23,9 @@ impl Corner {
     }
 }
 
-/// A border of the sheet.
-pub(super) struct SheetBorder {
-    /// Vertices of the file, ascending.
-    pub vertices: Vec<u32>,
-    /// Its longest extent, and how far it reaches from that.
-    length: f64,
-    width: f64,
-}
-
-impl SheetBorder {
-    /// As a seam that stays open.
-    pub fn as_seam(&self) -> Seam {
-        let ends = [0, self.vertices.len() - 1].map(|end| self.vertices[end]);
-        Seam { length: self.length, gap: self.width, widest: self.width, ends, is_joined: false }
-    }
-}
-
 /// Triangles in the file's coordinates.
-pub(super) struct Sheet {
+#[derive(Default)]
+pub(super) struct RepairSheet {
     pub positions: Vec<[f64; 3]>,
     pub faces: Vec<[u32; 3]>,
     /// For each vertex the first vertex of the file that became it.
@@ -58,52 +43,26 @@ pub(super) struct Sheet {
     /// What [`Keep::Largest`](super::Keep::Largest) left out; areas in the square of the file's unit.
     pub dropped_pieces: Vec<MeshPiece>,
     /// Polygons of the file that are left out because of [`Keep`](super::Keep).
-    dropped_faces: Vec<u32>,
+    pub dropped_faces: Vec<u32>,
     /// For each vertex of the file a number that those at its place share; `u32::MAX` for unused ones.
-    welded: Vec<u32>,
+    pub welded: Vec<u32>,
 }
 
-impl Sheet {
-    /// A sheet whose vertices still have the numbers of `welded`.
-    pub fn new(
-        positions: Vec<[f64; 3]>,
-        faces: Vec<[u32; 3]>,
-        face_origin: Vec<u32>,
-        corners: Vec<[Corner; 3]>,
-        welded: Vec<u32>,
-    ) -> Self {
-        let turned = vec![false; faces.len()];
-        Self {
-            positions,
-            faces,
-            vertex_origin: Vec::new(),
-            vertex_of_file: Vec::new(),
-            face_origin,
-            corners,
-            turned,
-            repairs: Vec::new(),
-            seams: Vec::new(),
-            dropped_pieces: Vec::new(),
-            dropped_faces: Vec::new(),
-            welded,
-        }
+impl RepairSheet {
+    /// Its triangles.
+    ///
+    /// # Errors
+    /// [`FitError::Mesh`] when there are none.
+    pub fn mesh(&self) -> Result<TriMesh, FitError> {
+        mesh_of(self.positions.clone(), self.faces.clone())
     }
 
     /// Adds a repair of some elements, if there are any.
-    pub fn note(&mut self, kind: RepairKind, elements: Elements) {
-        let elements = match elements {
-            Elements::Vertices(mut list) => {
-                list.sort_unstable();
-                list.dedup();
-                Elements::Vertices(list)
-            }
-            Elements::Faces(mut list) => {
-                list.sort_unstable();
-                list.dedup();
-                Elements::Faces(list)
-            }
-            Elements::Edges(list) => Elements::Edges(list),
-        };
+    pub fn note(&mut self, kind: RepairKind, mut elements: Elements) {
+        if let Elements::Vertices(list) | Elements::Faces(list) = &mut elements {
+            list.sort_unstable();
+            list.dedup();
+        }
         if !elements.is_empty() {
             self.repairs.push(Repair { kind, count: elements.len(), elements });
         }
@@ -112,16 +71,17 @@ impl Sheet {
     /// Leaves out vertices without a face and numbers the others as the file does.
     pub fn number_as_file(&mut self, file: &PolygonMesh) {
         let polygons: Vec<&[u32]> = file.polygons().collect();
+        // Every corner's vertex, the vertex of the file, and whether it is that itself.
+        let mut known: Vec<(usize, u32, bool)> = Vec::with_capacity(3 * self.faces.len());
+        for ((face, corners), polygon) in self.faces.iter().zip(&self.corners).zip(&self.face_origin) {
+            let of_file = |corner: &Corner| polygons[*polygon as usize][corner.number as usize];
+            known.extend(face.iter().zip(corners).map(|(v, c)| (*v as usize, of_file(c), c.is_own)));
+        }
         let mut origin = vec![u32::MAX; self.positions.len()];
         // Corners that split an edge tell of a vertex only if nothing else does.
         for own in [true, false] {
             let mut found = vec![u32::MAX; self.positions.len()];
-            for ((face, corners), polygon) in self.faces.iter().zip(&self.corners).zip(&self.face_origin) {
-                for (v, corner) in face.iter().zip(corners).filter(|(_, corner)| corner.is_own == own) {
-                    let of_file = polygons[*polygon as usize][corner.number as usize];
-                    found[*v as usize] = found[*v as usize].min(of_file);
-                }
-            }
+            known.iter().filter(|k| k.2 == own).for_each(|(v, f, _)| found[*v] = found[*v].min(*f));
             origin.iter_mut().zip(found).filter(|(o, _)| **o == u32::MAX).for_each(|(o, f)| *o = f);
         }
         let mut order: Vec<u32> =
@@ -134,10 +94,8 @@ impl Sheet {
         self.faces.iter_mut().flatten().for_each(|v| *v = number[*v as usize]);
 
         let mut became = vec![None; file.positions.len()];
-        for ((face, corners), polygon) in self.faces.iter().zip(&self.corners).zip(&self.face_origin) {
-            for (v, corner) in face.iter().zip(corners).filter(|(_, corner)| corner.is_own) {
-                became[polygons[*polygon as usize][corner.number as usize] as usize].get_or_insert(*v);
-            }
+        for (v, of_file, _) in known.iter().filter(|(_, _, is_own)| *is_own) {
+            became[*of_file as usize].get_or_insert(number[*v]);
         }
         // What only faces that were dropped use is where the others at its place are.
         let mut at_place = vec![None; self.positions.len().max(self.welded.len())];
@@ -199,23 +157,23 @@ impl Sheet {
         Seam { ends: seam.ends.map(|v| self.vertex_origin[v as usize]), ..*seam }
     }
 
-    /// All borders, in the order of `topology`, which is the sheet's.
-    pub fn borders(&self, topology: &Topology) -> Vec<SheetBorder> {
+    /// All borders, in the order of `topology`, which is the sheet's: their vertices in the file, ascending, and the seams that
+    /// they are if they stay open.
+    pub fn borders(&self, topology: &Topology) -> Vec<(Vec<u32>, Seam)> {
         let borders = topology.boundary_loops.iter().map(|border| {
-            let distance = |a: u32, b: u32| norm(sub(self.positions[b as usize], self.positions[a as usize]));
-            let farthest = |from: u32| {
-                let of = border.iter().map(|v| (*v, distance(from, *v)));
-                of.fold((from, 0.0), |best, v| if v.1 > best.1 { v } else { best })
+            let from = |a: u32, b: u32| sub(self.positions[b as usize], self.positions[a as usize]);
+            let farthest = |end: u32| {
+                let of = border.iter().map(|v| (*v, norm(from(end, *v))));
+                of.fold((end, 0.0), |best, v| if v.1 > best.1 { v } else { best })
             };
             let end = farthest(border[0]).0;
             let (other, length) = farthest(end);
-            let along = normalized(sub(self.positions[other as usize], self.positions[end as usize]));
-            let aside =
-                |v: &u32| norm(cross(along, sub(self.positions[*v as usize], self.positions[end as usize])));
-            let width = border.iter().map(aside).fold(0.0, f64::max);
+            let along = normalized(from(end, other));
+            let width = border.iter().map(|v| norm(cross(along, from(end, *v)))).fold(0.0, f64::max);
             let mut vertices: Vec<u32> = border.iter().map(|v| self.vertex_origin[*v as usize]).collect();
             vertices.sort_unstable();
-            SheetBorder { vertices, length, width }
+            let ends = [vertices[0], vertices[vertices.len() - 1]];
+            (vertices, Seam { length, gap: width, widest: width, ends, is_joined: false })
         });
         borders.collect()
     }
@@ -224,27 +182,6 @@ impl Sheet {
     pub fn area(&self, face: usize) -> f64 {
         let [a, b, c] = self.faces[face].map(|v| self.positions[v as usize]);
         0.5 * norm(cross(sub(b, a), sub(c, a)))
-    }
-
-    /// Connected pieces, and the piece of each face.
-    pub fn pieces(&self) -> (Vec<MeshPiece>, Vec<usize>) {
-        let Ok(mesh) = TriMesh::new(self.positions.clone(), self.faces.clone()) else {
-            return (Vec::new(), Vec::new());
-        };
-        let topology = Topology::new(&mesh);
-        let piece_of_face: Vec<usize> =
-            self.faces.iter().map(|f| topology.component_of_vertex[f[0] as usize] as usize).collect();
-        let empty = MeshPiece { vertices: 0, triangles: 0, area: 0.0, boundary_loops: 0 };
-        let mut pieces = vec![empty; topology.component_count];
-        topology.component_of_vertex.iter().for_each(|c| pieces[*c as usize].vertices += 1);
-        for (f, piece) in piece_of_face.iter().enumerate() {
-            pieces[*piece].triangles += 1;
-            pieces[*piece].area += self.area(f);
-        }
-        for border in &topology.boundary_loops {
-            pieces[topology.component_of_vertex[border[0] as usize] as usize].boundary_loops += 1;
-        }
-        (pieces, piece_of_face)
     }
 
     /// For each vertex of the file the place that it follows: the vertex it became; where its faces were left out on request, the
@@ -315,6 +252,14 @@ impl Sheet {
         let step = if turned { count - 1 } else { 1 };
         (0..count).map(|i| (start + i * step) % count).map(|k| Some([vertices[k as usize]?, k])).collect()
     }
+}
+
+/// A triangle mesh.
+///
+/// # Errors
+/// [`FitError::Mesh`] when there is none.
+pub(super) fn mesh_of(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Result<TriMesh, FitError> {
+    TriMesh::new(positions, faces).map_err(|e| FitError::Mesh(e.to_string()))
 }
 
 #[cfg(test)]

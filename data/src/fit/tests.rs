@@ -68,7 +68,7 @@ fn every_unit_up_axis_and_facing_is_found_and_the_garment_recovered() {
                 unit,
                 up,
                 turn_degrees: [0.0, 90.0, 180.0, 270.0][number % 4],
-                origin: if on_floor { Origin::Floor } else { Origin::Pelvis },
+                origin: if on_floor { FileOrigin::Floor } else { FileOrigin::Pelvis },
                 translation: [0.0, if on_floor { floor } else { 0.0 }, 0.0],
                 ..Placement::AS_GIVEN
             };
@@ -113,7 +113,7 @@ fn a_garment_with_its_origin_elsewhere_is_moved_onto_the_body() {
     let fitted = fit(&file, &body, &FitSettings::default()).unwrap();
     let placement = fitted.report.placement;
     assert_eq!((placement.unit, placement.up, placement.turn_degrees), (Unit::Cm, UpAxis::Y, 0.0));
-    assert_eq!(placement.origin, Origin::Elsewhere);
+    assert_eq!(placement.origin, FileOrigin::Elsewhere);
     // Where exactly a loose shirt sits is a matter of a centimetre or two.
     let error = norm(sub(placement.translation, centre));
     assert!(error < 0.03, "{error}");
@@ -136,7 +136,7 @@ fn messy(original: &Garment, body: &Body, degrees: f64) -> Messy {
         unit: Unit::Cm,
         up: UpAxis::Z,
         turn_degrees: 180.0,
-        origin: Origin::Floor,
+        origin: FileOrigin::Floor,
         translation: [0.0, body.zero_body().bounds().0[1], 0.0],
         arm_angle_degrees: degrees,
         leg_angle_degrees: 0.0,

@@ -2,81 +2,29 @@
 
 use super::cloth::Cloth;
 use super::diagnosis::size_doubt;
-use super::doubt::{Doubt, SAME};
 use super::error::FitError;
 use super::judge::Candidate;
-use super::placement::{Origin, Placement, Unit};
+use super::placement::{FileOrigin, Placement, Unit};
+use super::readings::{MOST_INSIDE, NEAR_TIE, Readings};
+use super::report::outfit_warning;
 use super::search::Search;
 use super::settings::FitSettings;
-use super::sitting::Sitting;
 use clothcombo_physics::vec3::{norm, sub};
 
-/// Another reading, or height, whose log-posterior is this near to the best is told.
-const NEAR_TIE: f64 = 6.0;
-/// Largest share of a garment that may lie inside the body where it is worn.
-const MOST_INSIDE: f64 = 0.25;
-/// Candidates that are looked at, the best first.
-const READ: usize = 8;
-/// A garment touches the body: a twentieth of it is nearer than this (m).
-const FARTHEST: f64 = 0.08;
 /// What lies on a part of the body is no farther from it, on average (m).
 const SNUG: f64 = 0.03;
-/// A garment hangs from a rim that is no farther from the body than this, on average (m).
-const WIDEST_RIM: f64 = 0.1;
-/// A neck opening is no longer than this many times the hem.
-const WIDEST_NECK: f64 = 1.5;
+/// Readings nearer to each other than this are the same (m).
+const SAME_READING: f64 = 0.02;
 /// Limbs that are held otherwise explain that much more (log-posterior), or are doubted.
 const LIMB_EVIDENCE: f64 = 12.0;
-/// Least height of a tube around the trunk (m): lower ones are belts.
-const LEAST_HEIGHT: f64 = 0.09;
 
-/// Why a candidate is not believed; `None` if it is.
-pub(super) fn implausibility(
-    candidate: &Candidate,
-    sitting: &Sitting,
-    height: f64,
-    off_trunk: Option<&str>,
-) -> Option<String> {
-    let percent = |share: f64| 100.0 * share;
-    if !candidate.is_worn {
-        return Some("no opening goes around the trunk, the neck or both arms".into());
-    }
-    if candidate.is_unfounded_turn {
-        return Some("turned by 180°, though its neckline does not show its front there".into());
-    }
-    // Sleeves made for other arms miss these ones where a file says where it is; a place that was searched for must do without.
-    let missed = if candidate.placement.origin == Origin::Elsewhere { candidate.piercing.arms } else { 0 };
-    let piercing = candidate.piercing.others + missed;
-    if piercing > 0 {
-        return Some(format!("{piercing} bones of the body pass through the cloth"));
-    }
-    if candidate.rim_distance > WIDEST_RIM {
-        return Some(format!(
-            "its upper rim stays {:.0} mm away from the body: nothing holds it",
-            1e3 * candidate.rim_distance
-        ));
-    }
-    if candidate.neck_over_hem > WIDEST_NECK {
-        return Some(format!(
-            "its neck opening is {:.1} times as long as its hem: upside down?",
-            candidate.neck_over_hem
-        ));
-    }
-    if candidate.is_tube && height < LEAST_HEIGHT {
-        return Some(format!("a band of {:.0} mm around the trunk, such as a belt", 1e3 * height));
-    }
-    if sitting.inside > MOST_INSIDE {
-        return Some(format!("{:.0} % of it lies inside the body", percent(sitting.inside)));
-    }
-    if sitting.nearest > FARTHEST {
-        return Some(format!("it stays {:.0} mm away from the body", 1e3 * sitting.nearest));
-    }
-    off_trunk.map(str::to_owned)
-}
+/// Of a file that says where it is on the body, where arms miss the sleeves.
+pub(super) const ARMS_MISS: &str = "arms of the body pass through the cloth of its sleeves, which were made for arms held \
+    otherwise or of another body: --arms or --from-body settles it";
 
 /// Where a file as it stands lies snugly on head, arms or feet: a band around the head is none around the chest of another unit.
 fn lies_off_trunk(candidate: &Candidate, search: &Search, cloth: &Cloth) -> Option<&'static str> {
-    if candidate.placement.origin == Origin::Elsewhere || !cloth.is_tubes() {
+    if candidate.placement.origin == FileOrigin::Elsewhere || !cloth.is_tubes() {
         return None;
     }
     let place = search.off_trunk(cloth, &candidate.placement)?;
@@ -84,51 +32,12 @@ fn lies_off_trunk(candidate: &Candidate, search: &Search, cloth: &Cloth) -> Opti
     (sitting.inside < MOST_INSIDE && sitting.mean_distance < SNUG).then_some(place)
 }
 
-/// A placement and the doubts about it.
-pub(super) struct Verdict {
+/// A placement, and what is not certain about it, with the flags that settle it.
+pub(super) struct PlacementVerdict {
     pub placement: Placement,
-    pub doubts: Vec<Doubt>,
-}
-
-impl Verdict {
+    pub doubts: Vec<String>,
     /// Whether it is taken because hints say so, though it does not look worn.
-    pub fn is_odd(&self) -> bool {
-        self.doubts.iter().any(|doubt| matches!(doubt, Doubt::Odd { .. }))
-    }
-}
-
-/// The best readings, the best first.
-pub(super) struct Readings {
-    pub believed: Vec<Candidate>,
-    refused: Vec<(Candidate, String)>,
-    /// Whether the best one lies on the body as it stands, though nobody wears it there.
-    is_near: bool,
-}
-
-impl Readings {
-    pub fn new(candidates: &[Candidate], search: &Search, cloth: &Cloth) -> Self {
-        let (mut believed, mut refused): (Vec<Candidate>, Vec<(Candidate, String)>) = Default::default();
-        let mut is_near = false;
-        for candidate in candidates.iter().take(READ) {
-            // What is far worse than one that is believed is not looked at.
-            if believed.first().is_some_and(|best| candidate.score < best.score - NEAR_TIE) {
-                break;
-            }
-            let (sitting, height) = search.measured(cloth, &candidate.placement);
-            let off_trunk = search.off_trunk(cloth, &candidate.placement);
-            match implausibility(candidate, &sitting, height, off_trunk) {
-                None => believed.push(*candidate),
-                Some(why) => {
-                    is_near |= refused.is_empty()
-                        && candidate.placement.origin != Origin::Elsewhere
-                        && sitting.inside < MOST_INSIDE
-                        && sitting.mean_distance < FARTHEST;
-                    refused.push((*candidate, why));
-                }
-            }
-        }
-        Self { believed, refused, is_near }
-    }
+    pub is_odd: bool,
 }
 
 /// Takes the best of `candidates`, the best first.
@@ -140,9 +49,9 @@ pub(super) fn verdict(
     search: &Search,
     cloth: &Cloth,
     settings: &FitSettings,
-) -> Result<Verdict, FitError> {
+) -> Result<PlacementVerdict, FitError> {
     let Readings { believed, refused, is_near } = Readings::new(candidates, search, cloth);
-    let mut doubts = Vec::new();
+    let mut doubts: Vec<String> = Vec::new();
     let Some(candidate) = believed.first().or(refused.first().map(|(best, _)| best)).copied() else {
         return Err(FitError::Implausible { best: "none".into(), second: None });
     };
@@ -159,15 +68,15 @@ pub(super) fn verdict(
             let best = readings.next().unwrap_or_default();
             return Err(FitError::Implausible { best, second: readings.next() });
         }
-        doubts.push(Doubt::Odd { why: why.clone() });
+        doubts.push(format!("it does not look worn there: {why}; the hints are taken all the same"));
     }
     if let Some(size) = size_doubt(search, cloth, settings, &candidate) {
         match settings.says_place() || !size.is_refused() {
-            true => doubts.push(Doubt::Size(size)),
+            true => doubts.push(format!("{size}: is it of another size, or in another unit (--unit)?")),
             false => return Err(FitError::Size { size }),
         }
     }
-    let is_usual = candidate.placement.origin != Origin::Elsewhere || settings.offset.is_some();
+    let is_usual = candidate.placement.origin != FileOrigin::Elsewhere || settings.offset.is_some();
     let (candidate, least_loss) = match is_usual {
         true => (candidate, f64::INFINITY),
         false => search.probed(cloth, settings, candidate),
@@ -178,7 +87,26 @@ pub(super) fn verdict(
     {
         return Err(FitError::OffTrunk { place });
     }
-    let taken = candidate.placement;
+    doubts.extend(near_tie(&candidate, &believed, search, cloth));
+    if least_loss < NEAR_TIE {
+        doubts.push(format!(
+            "its height is known to 3 cm only: look at it; {} takes it, another y moves it",
+            offset_flag(&candidate.placement)
+        ));
+    }
+    if candidate.is_tube && settings.category.is_none() && !is_usual {
+        doubts.push(
+            "a tube with two openings may be a skirt at the waist or a strapless top at the chest; --category settles it"
+                .into(),
+        );
+    }
+    doubts.extend(worn_otherwise(&candidate, candidates, settings));
+    Ok(PlacementVerdict { placement: candidate.placement, doubts, is_odd: believed.is_empty() })
+}
+
+/// Another reading that is nearly as good as the one taken.
+fn near_tie(taken: &Candidate, believed: &[Candidate], search: &Search, cloth: &Cloth) -> Option<String> {
+    let taken = taken.placement;
     let points = search.level(cloth, &taken);
     let apart = |other: &Placement| {
         let other = search.level(cloth, other);
@@ -187,31 +115,69 @@ pub(super) fn verdict(
         // Sleeves are a small part of a garment.
         apart.get(apart.len() * 19 / 20).copied().unwrap_or(0.0)
     };
-    let other = believed.iter().skip(1).map(|c| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME);
-    if let Some((other, apart)) = other {
-        doubts.push(Doubt::NearTie { taken, other, apart });
+    let mut others = believed.iter().skip(1).map(|c| (c.placement, apart(&c.placement)));
+    others.find(|(_, apart)| *apart > SAME_READING).map(|(other, apart)| {
+        format!(
+            "another placement, up to {:.0} mm away, fits nearly as well: {}; {} settles it",
+            1e3 * apart,
+            other.reading(),
+            differences(&taken, &other).join(" ")
+        )
+    })
+}
+
+/// What is not certain about how a candidate is worn: by itself, by these arms, this way round, with limbs held so.
+fn worn_otherwise(taken: &Candidate, candidates: &[Candidate], settings: &FitSettings) -> Vec<String> {
+    let mut doubts: Vec<String> = outfit_warning(taken.worn_pieces).into_iter().collect();
+    let placement = &taken.placement;
+    if taken.piercing.arms > 0 {
+        doubts.push(ARMS_MISS.into());
     }
-    if least_loss < NEAR_TIE {
-        doubts.push(Doubt::Height { taken });
-    }
-    if candidate.is_tube && settings.category.is_none() && !is_usual {
-        doubts.push(Doubt::Tube);
-    }
-    if candidate.worn_pieces > 1 {
-        doubts.push(Doubt::Outfit { pieces: candidate.worn_pieces });
-    }
-    if candidate.piercing.arms > 0 {
-        doubts.push(Doubt::Arms);
-    }
-    if taken.turn_degrees == 180.0 && settings.turn_degrees.is_none() && candidate.neck_drop.is_none() {
-        doubts.push(Doubt::Turned);
+    if placement.turn_degrees == 180.0 && settings.turn_degrees.is_none() && taken.neck_drop.is_none() {
+        doubts.push(
+            "turned by 180°, as it lies better on the body so, though no neckline shows where its front is; --turn 0 keeps it"
+                .into(),
+        );
     }
     // Those that are hinted at are alike in all candidates.
     let held = |c: &Candidate| (c.placement.arm_angle_degrees != 0.0, c.placement.leg_angle_degrees != 0.0);
-    let otherwise = candidates.iter().find(|c| held(c) != held(&candidate));
-    let margin = otherwise.map_or(f64::MAX, |other| candidate.score - other.score);
-    if held(&candidate) != (false, false) && margin < LIMB_EVIDENCE {
-        doubts.push(Doubt::Limbs { taken, margin });
+    let otherwise = candidates.iter().find(|c| held(c) != held(taken));
+    let margin = otherwise.map_or(f64::MAX, |other| taken.score - other.score);
+    if !placement.has_limbs_at_rest() && margin < LIMB_EVIDENCE {
+        let (limbs, flag, angle) = match placement.arm_angle_degrees {
+            0.0 => ("legs", "--legs 0", placement.leg_angle_degrees),
+            angle => ("arms", "--arms t", angle),
+        };
+        doubts.push(format!(
+            "little tells that its {limbs} are {angle:.0}° from the rest pose (log-odds {margin:.1}); {flag} if they are not"
+        ));
     }
-    Ok(Verdict { placement: taken, doubts })
+    doubts
+}
+
+/// Flags by which the placement taken differs from another, as they fix the one taken.
+fn differences(taken: &Placement, other: &Placement) -> Vec<String> {
+    let level = |p: &Placement| p.arm_angle_degrees == 0.0;
+    let together = |p: &Placement| p.leg_angle_degrees == 0.0;
+    let flags = [
+        (taken.unit != other.unit, format!("--unit {}", taken.unit)),
+        (taken.up != other.up, format!("--up {}", taken.up)),
+        (taken.turn_degrees != other.turn_degrees, format!("--turn {}", taken.turn_degrees)),
+        (level(taken) != level(other), format!("--arms {}", if level(taken) { "t" } else { "a" })),
+        (together(taken) != together(other), format!("--legs {:.0}", taken.leg_angle_degrees)),
+    ];
+    let flags: Vec<String> =
+        flags.into_iter().filter_map(|(differs, flag)| differs.then_some(flag)).collect();
+    match flags.is_empty() {
+        true if norm(sub(taken.translation, other.translation)) < SAME_READING => {
+            vec!["--from-body with the body it was made on".into()]
+        }
+        true => vec![offset_flag(taken)],
+        false => flags,
+    }
+}
+
+fn offset_flag(taken: &Placement) -> String {
+    let [x, y, z] = taken.translation;
+    format!("--offset {x:.3},{y:.3},{z:.3}")
 }

@@ -25,7 +25,7 @@ pub(crate) use isosurface::{Lattice, extract};
 pub use labelled_triangles::LabelledTriangles;
 pub use manifold::{Joined, SplitMesh, join_faces, orient, outward_area, outwardness, split_fans};
 pub use measures::{MeshDefects, MeshMeasures};
-pub use push_out::{BodyClearance, contact, one_rings, push_out};
+pub use push_out::{BodyClearance, contact, gaps_to, one_rings, push_out};
 pub use remesh::{Quality, RemeshTarget, remesh};
 pub use seams::{COINCIDE_SHARE, JoinedSheet, Seam, join_seams, open_seams};
 #[cfg(test)]

@@ -13,9 +13,16 @@ pub struct BodyClearance {
     pub least_gap: f64,
 }
 
+/// Signed distance of every point to the closest point of a body (m), positive outside.
+pub fn gaps_to(points: &[[f64; 3]], body: &Surface<f64>) -> Vec<f64> {
+    // Built before it is shared.
+    body.closest_point();
+    points.par_iter().with_min_len(64).map(|p| body.gap(*p, Distance::ClosestPoint).gap).collect()
+}
+
 /// How a mesh lies to a body.
 pub fn contact(positions: &[[f64; 3]], body: &Surface<f64>) -> BodyClearance {
-    let gaps: Vec<f64> = positions.par_iter().map(|p| body.gap(*p, Distance::ClosestPoint).gap).collect();
+    let gaps = gaps_to(positions, body);
     BodyClearance {
         inside: gaps.iter().filter(|g| **g < 0.0).count(),
         least_gap: gaps.into_iter().fold(f64::MAX, f64::min),

@@ -15,7 +15,7 @@ mod shape;
 mod sheets;
 
 use clothcombo_data::asset::rotation;
-use clothcombo_data::fit::{Origin, Placement, Unit, UpAxis};
+use clothcombo_data::fit::{FileOrigin, Placement, Unit, UpAxis};
 use clothcombo_data::format::PolygonMesh;
 use draw::Draw;
 use shape::Shape;
@@ -96,7 +96,7 @@ fn object(kind: &Kind, number: usize, draw: &mut Draw) -> Object {
         unit: draw.any(kind.units),
         up: draw.any(&UpAxis::USUAL),
         turn_degrees: draw.any(&[0.0, 90.0, 180.0, 270.0]),
-        origin: Origin::Pelvis,
+        origin: FileOrigin::Pelvis,
         translation: [0.0; 3],
         ..Placement::AS_GIVEN
     };

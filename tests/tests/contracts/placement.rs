@@ -4,7 +4,7 @@
 //! tries more.
 
 use clothcombo_data::asset::{Binding, BindingSettings, Body, BodyFileSettings, Category, Garment, Pose};
-use clothcombo_data::fit::{FitSettings, Origin, Placement, Unit, UpAxis, fit};
+use clothcombo_data::fit::{FileOrigin, FitSettings, Placement, Unit, UpAxis, fit};
 use clothcombo_data::format::PolygonMesh;
 use clothcombo_data::generate::{GarmentGenerator, mannequin};
 use clothcombo_physics::vec3::{add, norm, scale, sub};
@@ -46,7 +46,7 @@ fn convention(rng: &mut ChaCha8Rng) -> Placement {
         unit: Unit::ALL[rng.random_range(0..Unit::ALL.len())],
         up: UpAxis::USUAL[rng.random_range(0..UpAxis::USUAL.len())],
         turn_degrees: 90.0 * f64::from(rng.random_range(0..4)),
-        origin: Origin::Elsewhere,
+        origin: FileOrigin::Elsewhere,
         translation: scale(direction, shift),
         leg_angle_degrees: 0.0,
         arm_angle_degrees: if rng.random::<bool>() { rng.random_range(ARMS[0]..ARMS[1]) } else { 0.0 },

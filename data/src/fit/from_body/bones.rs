@@ -9,48 +9,35 @@ use crate::asset::rotation::{IDENTITY, Matrix3, apply, matrix_from_axis_angle};
 use clothcombo_physics::vec3::{add, cross, dot, norm, scale, sub};
 
 /// Limbs from the trunk outwards.
-const LIMBS: [[&str; 4]; 4] = [
+const LIMB_JOINTS: [[&str; 4]; 4] = [
     ["left_hip", "left_knee", "left_ankle", "left_foot"],
     ["right_hip", "right_knee", "right_ankle", "right_foot"],
     ["left_shoulder", "left_elbow", "left_wrist", ""],
     ["right_shoulder", "right_elbow", "right_wrist", ""],
 ];
 
-/// A skeleton at rest.
-pub(super) struct Skeleton<'a> {
-    pub names: &'a [String],
-    pub parents: &'a [Option<usize>],
-    /// Joints (m).
-    pub joints: &'a [[f64; 3]],
+/// The joint of exactly this name.
+fn joint(body: &Body, name: &str) -> Option<usize> {
+    body.joint_names.iter().position(|n| n == name)
 }
 
-impl<'a> Skeleton<'a> {
-    /// Of the zero body.
-    pub fn of(body: &'a Body) -> Self {
-        Self { names: &body.joint_names, parents: &body.parents, joints: &body.joint_template }
-    }
-
-    fn joint(&self, name: &str) -> Option<[f64; 3]> {
-        self.names.iter().position(|n| n == name).and_then(|j| self.joints.get(j)).copied()
-    }
-
-    /// The middle between the joints of both sides.
-    fn middle(&self, part: &str) -> Result<[f64; 3], String> {
-        let side = |side: &str| {
-            let name = format!("{side}_{part}");
-            self.joint(&name).ok_or(format!("it has no joint '{name}'; joints are matched by SMPL's names"))
-        };
-        Ok(scale(add(side("left")?, side("right")?), 0.5))
-    }
+/// The middle between the joints of both sides (m).
+fn middle(body: &Body, part: &str) -> Result<[f64; 3], String> {
+    let side = |side: &str| {
+        let name = format!("{side}_{part}");
+        let place = joint(body, &name).map(|j| body.joint_template[j]);
+        place.ok_or(format!("it has no joint '{name}'; joints are matched by SMPL's names"))
+    };
+    Ok(scale(add(side("left")?, side("right")?), 0.5))
 }
 
 /// For every joint of `source` the affine map (a similarity) of its part to `target`.
 ///
 /// # Errors
 /// When hips or shoulders are missing, or lie on each other.
-pub(super) fn similarities(source: &Skeleton, target: &Skeleton) -> Result<Vec<[[f64; 4]; 3]>, String> {
-    let [low, to_low] = [source.middle("hip")?, target.middle("hip")?];
-    let [high, to_high] = [source.middle("shoulder")?, target.middle("shoulder")?];
+pub(super) fn similarities(source: &Body, target: &Body) -> Result<Vec<[[f64; 4]; 3]>, String> {
+    let [low, to_low] = [middle(source, "hip")?, middle(target, "hip")?];
+    let [high, to_high] = [middle(source, "shoulder")?, middle(target, "shoulder")?];
     let factor = (to_high[1] - to_low[1]) / (high[1] - low[1]);
     if !(0.2..=5.0).contains(&factor) {
         return Err(format!(
@@ -58,18 +45,21 @@ pub(super) fn similarities(source: &Skeleton, target: &Skeleton) -> Result<Vec<[
             high[1] - low[1]
         ));
     }
-    let middle = |a, b| scale(add(a, b), 0.5);
-    let trunk = similarity(&IDENTITY, factor, middle(low, high), middle(to_low, to_high));
-    let mut maps = vec![trunk; source.joints.len()];
+    let between = |a, b| scale(add(a, b), 0.5);
+    let trunk = similarity(&IDENTITY, factor, between(low, high), between(to_low, to_high));
+    let mut maps = vec![trunk; source.joint_count()];
+    // The joint, and where it is on either body.
+    let both = |name: &str| {
+        let (j, k) = (joint(source, name)?, joint(target, name)?);
+        Some((j, source.joint_template[j], target.joint_template[k]))
+    };
     let mut is_limb = vec![false; maps.len()];
-    for limb in LIMBS {
+    for limb in LIMB_JOINTS {
         let (mut turn, mut length) = (IDENTITY, factor);
         for (k, name) in limb.iter().enumerate() {
-            let Some(j) = source.names.iter().position(|n| n == name) else { continue };
-            let (Some(from), Some(to)) = (source.joint(name), target.joint(name)) else { continue };
+            let Some((j, from, to)) = both(name) else { continue };
             // Hands and feet go on as what they hang on.
-            let next = limb.get(k + 1).and_then(|next| Some((source.joint(next)?, target.joint(next)?)));
-            if let Some((a, b)) = next {
+            if let Some((_, a, b)) = limb.get(k + 1).and_then(|next| both(next)) {
                 let (a, b) = (sub(a, from), sub(b, to));
                 if norm(a) > 1e-3 && norm(b) > 1e-3 && k < 2 {
                     turn = shortest_turn(a, b);
@@ -120,14 +110,15 @@ mod tests {
         let body = mannequin();
         let other: Vec<[f64; 3]> =
             body.joint_template.iter().map(|[x, y, z]| [1.1 * x, 0.9 * y - 0.05 * x.abs(), *z]).collect();
-        let skeleton = |joints| Skeleton { names: &body.joint_names, parents: &body.parents, joints };
-        let maps = similarities(&skeleton(&other), &skeleton(&body.joint_template)).unwrap();
-        for name in LIMBS.iter().flatten().filter(|n| !n.is_empty()) {
+        let mut source = body.clone();
+        source.joint_template.clone_from(&other);
+        let maps = similarities(&source, &body).unwrap();
+        for name in LIMB_JOINTS.iter().flatten().filter(|n| !n.is_empty()) {
             let j = body.joint_names.iter().position(|n| n == name).unwrap();
             let error = norm(sub(transform(&maps[j], other[j]), body.joint_template[j]));
             assert!(error < 1e-9, "{name}: {error}");
         }
-        let own = similarities(&skeleton(&body.joint_template), &skeleton(&body.joint_template)).unwrap();
+        let own = similarities(&body, &body).unwrap();
         for (map, p) in own.iter().zip(&body.joint_template) {
             assert!(norm(sub(transform(map, *p), *p)) < 1e-12);
         }
@@ -136,9 +127,8 @@ mod tests {
     #[test]
     fn a_rig_of_other_names_is_refused() {
         let body = mannequin();
-        let names: Vec<String> = body.joint_names.iter().map(|n| format!("rig:{n}")).collect();
-        let other = Skeleton { names: &names, parents: &body.parents, joints: &body.joint_template };
-        let own = Skeleton { names: &body.joint_names, parents: &body.parents, joints: &body.joint_template };
-        assert!(similarities(&other, &own).unwrap_err().contains("left_hip"));
+        let mut other = body.clone();
+        other.joint_names.iter_mut().for_each(|n| *n = format!("rig:{n}"));
+        assert!(similarities(&other, &body).unwrap_err().contains("left_hip"));
     }
 }

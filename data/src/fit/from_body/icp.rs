@@ -1,16 +1,15 @@
 //! Registration of points to a surface by iterated closest points with point-to-plane distances, trimmed.
 
+use crate::asset::NormalEquations;
 use crate::asset::rotation::{self, IDENTITY, Matrix3};
 use clothcombo_physics::Surface;
 use clothcombo_physics::vec3::{add, cross, dot, scale, sub};
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
 use rayon::prelude::*;
 
 /// Share of the points that have a say; what two people do not share, hair and shoes, is left out.
-const TRIM: f64 = 0.8;
+const ICP_SHARE: f64 = 0.8;
 /// Closest points farther away (m) are on another part of the body.
-const REACH: f64 = 0.15;
+const ICP_REACH: f64 = 0.15;
 /// The scale stays within this factor of where it began.
 const SCALE_RANGE: f64 = 1.2;
 
@@ -75,38 +74,31 @@ fn step(
         .with_min_len(64)
         .filter_map(|p| {
             let p = motion.apply(*p);
-            let found = surface.closest_point().project_within(p, REACH)?;
+            let found = surface.closest_point().project_within(p, ICP_REACH)?;
             Some((p, found.normal, dot(found.normal, sub(found.position, p))))
         })
         .collect();
     pairs.sort_by(|a, b| a.2.abs().total_cmp(&b.2.abs()));
-    pairs.truncate((TRIM * pairs.len() as f64) as usize);
+    pairs.truncate((ICP_SHARE * pairs.len() as f64) as usize);
     let count = pairs.len() as f64;
+    // Fewer do not tell how a body stands.
     if pairs.len() < 50 {
         return None;
     }
     let centre = scale(pairs.iter().fold([0.0; 3], |sum, (p, _, _)| add(sum, *p)), 1.0 / count);
     let size = if with_scale { 7 } else { 6 };
-    let mut gram = vec![[0.0; 7]; 7];
-    let mut right = [0.0; 7];
+    let mut equations = NormalEquations::new(size);
     for (p, n, wanted) in &pairs {
         let arm = sub(*p, centre);
         let [a, b, c] = cross(arm, *n);
-        let row = [a, b, c, n[0], n[1], n[2], dot(arm, *n)];
-        for i in 0..size {
-            right[i] += row[i] * wanted;
-            (0..size).for_each(|j| gram[i][j] += row[i] * row[j]);
-        }
+        equations.add(&[a, b, c, n[0], n[1], n[2], dot(arm, *n)][..size], *wanted);
     }
-    let ridge = 1e-9 * count;
-    let gram = Mat::from_fn(size, size, |i, j| gram[i][j] + if i == j { ridge } else { 0.0 });
-    let solution = gram.llt(Side::Lower).ok()?.solve(Mat::from_fn(size, 1, |i, _| right[i]));
-    let x = |i: usize| solution[(i, 0)];
-    let turn = rotation::matrix_from_axis_angle([x(0), x(1), x(2)]);
-    let factor = if with_scale { 1.0 + x(6) } else { 1.0 };
+    let x = equations.solution(|_| 1e-9 * count)?;
+    let turn = rotation::matrix_from_axis_angle([x[0], x[1], x[2]]);
+    let factor = if with_scale { 1.0 + x[6] } else { 1.0 };
     // About the centre: p ↦ c + factor · turn · (p − c) + shift.
     let about = |p: [f64; 3]| {
-        add(scale(rotation::apply(&turn, sub(p, centre)), factor), add(centre, [x(3), x(4), x(5)]))
+        add(scale(rotation::apply(&turn, sub(p, centre)), factor), add(centre, [x[3], x[4], x[5]]))
     };
     let next = Similarity {
         scale: factor * motion.scale,

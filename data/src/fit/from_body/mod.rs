@@ -6,16 +6,15 @@
 //! | source body | carried by |
 //! |---|---|
 //! | npz of the target's model | inverse of the shape transfer ([`same_model`]) |
-//! | npz of another model | a similarity per bone, then the distance to the skin ([`other_model`]) |
+//! | npz of another model | a similarity per bone ([`bones`]), then the distance to the skin ([`gaps`]) |
 //! | mesh of the target's vertices | recovered pose and shape, then as the first ([`same_model`]) |
-//! | any mesh of a person | registration with the target's model, the distance to the skin, then as the first ([`registered`]) |
+//! | any mesh of a person | registration with the target's model ([`registration`]), the distance to the skin, then as the first |
 
+mod binding;
 mod bones;
+mod closest_shape;
 mod gaps;
 mod icp;
-mod model;
-mod other_model;
-mod registered;
 mod registration;
 mod same_model;
 mod source;
@@ -23,21 +22,25 @@ mod stance;
 #[cfg(test)]
 mod tests;
 
+pub(super) use binding::SourceCloth;
+pub(super) use same_model::{POSE_BINDINGS, SameModel};
 pub use source::SourceBody;
 
 use super::error::FitError;
-use super::placement::{Origin, Placement, Unit, UpAxis};
+use super::placement::{FileOrigin, Placement, Unit, UpAxis};
 use super::settings::FitSettings;
-use crate::asset::{Binding, BindingSettings, Body, BodyParts, Category, Garment};
-use clothcombo_physics::query::Distance;
+use crate::asset::body::skin;
+use crate::asset::{Body, Category};
+use crate::mesh::gaps_to;
+use bones::similarities;
+use clothcombo_physics::Surface;
 use clothcombo_physics::vec3::{norm, scale, sub};
-use clothcombo_physics::{Surface, TriMesh};
-use other_model::OtherModel;
-use rayon::prelude::*;
-use registered::Registered;
-use same_model::SameModel;
+use gaps::{apart_mm, median, restore};
+use icp::Similarity;
+use registration::{RegisteredMesh, register};
+use same_model::{RecoveredMesh, SHAPE_BINDINGS, has_topology, recovered};
 use serde::Serialize;
-use source::SourceKind;
+use source::{SourceKind, SourceMesh, SourceModel};
 
 /// What was done with a garment that was made on another body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -102,15 +105,22 @@ impl SourcePlacement {
 pub(super) struct Aligned {
     /// From the file to the source body, in metres with y up.
     pub placement: Placement,
-    name: String,
-    shape: Vec<f64>,
-    carrier: Carrier,
+    /// The surface on which the garment was made (m).
+    source: Surface<f64>,
+    to_model: ToModel,
+    /// The target's model, on which the garment lies then.
+    model: SameModel,
+    /// What is said of it, but for how far the garment moves.
+    report: SourcePlacement,
 }
 
-enum Carrier {
-    Same(SameModel),
-    Other(OtherModel),
-    Registered(Registered),
+/// How cloth on the source body comes to the target's model.
+enum ToModel {
+    /// It is there.
+    Identity,
+    /// By the bones of another model's body.
+    Bones(Box<Body>, Vec<[[f64; 4]; 3]>),
+    Registration(Similarity),
 }
 
 impl SourceBody {
@@ -130,44 +140,101 @@ impl SourceBody {
                 return Err(wrong(format!("the body says {says}; leave {flag} out")));
             }
         }
-        let name = self.name.clone();
+        let report = SourcePlacement {
+            body: self.name.clone(),
+            shape: Vec::new(),
+            carried: Carried::Shape,
+            alignment_mm: None,
+            pelvis: None,
+            scale: 1.0,
+            moved_mm: 0.0,
+        };
         match &self.kind {
-            SourceKind::Model(model) => {
-                let placement = Placement {
-                    unit: settings.unit.unwrap_or(Unit::M),
-                    up: settings.up.unwrap_or(UpAxis::Y),
-                    turn_degrees: settings.turn_degrees.unwrap_or(0.0),
-                    origin: Origin::SourceBody,
-                    translation: settings.offset.unwrap_or(scale(model.pelvis, -1.0)),
-                    ..Placement::AS_GIVEN
-                };
-                let carrier = match same_model::has_topology(body, &model.faces) {
-                    true => Carrier::Same(SameModel::shaped(model.positions.clone())),
-                    false => Carrier::Other(OtherModel::new(model, body).map_err(wrong)?),
-                };
-                Ok(Aligned { placement, name, shape: model.shape.clone(), carrier })
-            }
-            SourceKind::Mesh(mesh) => {
-                // Vertices in another order, or of another model by chance, are a mesh like any other.
-                if let Some((placement, shape, same)) = same_model::recovered(mesh, body, settings) {
-                    return Ok(Aligned { placement, name, shape, carrier: Carrier::Same(same) });
-                }
-                let (placement, registered) = registration::register(mesh, body, settings).map_err(wrong)?;
-                let shape = registered.shape.clone();
-                Ok(Aligned { placement, name, shape, carrier: Carrier::Registered(registered) })
-            }
+            SourceKind::Model(source) => Aligned::of_model(source, body, settings, report).map_err(wrong),
+            SourceKind::Mesh(mesh) => Aligned::of_mesh(mesh, body, settings, report).map_err(wrong),
         }
     }
 }
 
-/// Cloth on the source body, in its coordinates (m).
-pub(super) struct Cloth<'a> {
-    pub positions: &'a [[f64; 3]],
-    pub faces: &'a [[u32; 3]],
-    pub category: Option<Category>,
+/// The vertices of a body, carried by its bones.
+fn skinned(body: &Body, bones: &[[[f64; 4]; 3]]) -> Vec<[f64; 3]> {
+    let carried = |v: usize| {
+        let (joints, weights) = body.skin_weights.row(v);
+        let bones = joints.iter().zip(weights).map(|(j, w)| (&bones[usize::from(*j)], f64::from(*w)));
+        skin(body.template[v], bones)
+    };
+    (0..body.vertex_count()).map(carried).collect()
 }
 
 impl Aligned {
+    fn of_model(
+        source: &SourceModel,
+        body: &Body,
+        settings: &FitSettings,
+        report: SourcePlacement,
+    ) -> Result<Self, String> {
+        let translation = settings.offset.unwrap_or(scale(source.pelvis, -1.0));
+        let placement = Placement {
+            unit: settings.unit.unwrap_or(Unit::M),
+            up: settings.up.unwrap_or(UpAxis::Y),
+            turn_degrees: settings.turn_degrees.unwrap_or(0.0),
+            origin: FileOrigin::SourceBody,
+            translation,
+            ..Placement::AS_GIVEN
+        };
+        let pelvis = Some(translation.map(|x| 0.0 - x));
+        let report = SourcePlacement { shape: source.shape.clone(), pelvis, ..report };
+        let own = &source.body;
+        let surface = Surface::from_mesh(&own.zero_body());
+        if has_topology(body, &own.faces) {
+            let (to_model, model) = (ToModel::Identity, SameModel::shaped(own.template.clone()));
+            return Ok(Self { placement, source: surface, to_model, model, report });
+        }
+        let bones = similarities(own, body)?;
+        let alignment_mm = Some(apart_mm(&skinned(own, &bones), &Surface::from_mesh(&body.zero_body())));
+        Ok(Self {
+            placement,
+            source: surface,
+            to_model: ToModel::Bones(Box::new(own.clone()), bones),
+            model: SameModel::shaped(body.template.clone()),
+            report: SourcePlacement { carried: Carried::Bones, alignment_mm, ..report },
+        })
+    }
+
+    fn of_mesh(
+        mesh: &SourceMesh,
+        body: &Body,
+        settings: &FitSettings,
+        report: SourcePlacement,
+    ) -> Result<Self, String> {
+        // Vertices in another order, or of another model by chance, are a mesh like any other.
+        if let Some(RecoveredMesh { placement, shape, model, residual_mm }) = recovered(mesh, body, settings)
+        {
+            let source = Surface::new(model.positions().to_vec(), body.faces.clone());
+            let (carried, alignment_mm) = (Carried::PoseAndShape, Some(residual_mm));
+            let pelvis = Some(placement.translation.map(|x| 0.0 - x));
+            let report = SourcePlacement { shape, carried, alignment_mm, pelvis, ..report };
+            return Ok(Self { placement, source, to_model: ToModel::Identity, model, report });
+        }
+        let RegisteredMesh { placement, motion, model, alignment_mm } =
+            register(&mesh.surface, body, settings)?;
+        let positions = placement.apply(mesh.surface.positions());
+        let report = SourcePlacement {
+            shape: model.shape.clone(),
+            carried: Carried::Registration,
+            alignment_mm: Some(alignment_mm),
+            scale: motion.scale,
+            ..report
+        };
+        Ok(Self {
+            placement,
+            source: Surface::new(positions, mesh.surface.faces().into()),
+            to_model: ToModel::Registration(motion),
+            model: SameModel::posed(body, model)?,
+            report,
+        })
+    }
+
     /// A garment that does not lie on its body.
     pub fn not_on_it(&self, where_it_is: &str) -> FitError {
         let what = format!(
@@ -175,14 +242,14 @@ impl Aligned {
              export both together, or say how the garment's coordinates differ by --unit, --up, --turn and, beside an npz, --offset; \
              an npz takes shape parameters as body.npz:1.2,-0.5"
         );
-        FitError::SourceBody { name: self.name.clone(), what }
+        FitError::SourceBody { name: self.report.body.clone(), what }
     }
 
     /// What is odd about a garment where its body puts it.
     pub fn doubt(&self, what: &str) -> String {
         format!(
             "placed through {}, the garment looks odd: {what}: was it made on this body, and are both in the same coordinates?",
-            self.name
+            self.report.body
         )
     }
 
@@ -197,126 +264,60 @@ impl Aligned {
         category: Option<Category>,
         body: &Body,
     ) -> Result<(Vec<[f64; 3]>, SourcePlacement), FitError> {
-        let source = match &self.carrier {
-            Carrier::Same(same) => same.surface(body),
-            Carrier::Other(other) => other.surface(),
-            Carrier::Registered(registered) => registered.surface(),
-        };
-        let source = Surface::new(source.0, source.1);
         let placed = self.placement.apply(positions);
-        let lies = Lies::new(&placed, &source);
-        if let Some(where_it_is) = lies.implausible() {
+        let gaps = gaps_to(&placed, &self.source);
+        if let Some(where_it_is) = off_its_body(&gaps) {
             return Err(self.not_on_it(&where_it_is));
         }
-        let cloth = Cloth { positions: &placed, faces, category };
-        let (carried, base, how, alignment_mm, scale) = match &self.carrier {
-            Carrier::Same(same) => {
-                let how = if same.is_posed() { Carried::PoseAndShape } else { Carried::Shape };
-                (
-                    same.carry(&cloth, body).map_err(FitError::Mesh)?,
-                    placed.clone(),
-                    how,
-                    same.residual_mm,
-                    1.0,
-                )
+        let rest = |positions: &[[f64; 3]]| {
+            let cloth = SourceCloth { positions, faces, category };
+            self.model.carry(&cloth, body, SHAPE_BINDINGS).map_err(FitError::Mesh)
+        };
+        let restored = |mut positions: Vec<[f64; 3]>| {
+            let gaps: Vec<f64> = gaps.iter().map(|gap| self.report.scale * gap).collect();
+            let target = Surface::new(self.model.positions().to_vec(), body.faces.clone());
+            restore(&mut positions, faces, &gaps, &target);
+            rest(&positions)
+        };
+        let (carried, base) = match &self.to_model {
+            ToModel::Identity => (rest(&placed)?, placed),
+            ToModel::Bones(own, bones) => {
+                let cloth = SourceCloth { positions: &placed, faces, category };
+                let binding = cloth.bound(placed.clone(), own, body).map_err(FitError::Mesh)?;
+                (restored(binding.skinned(&placed, bones))?, placed)
             }
-            Carrier::Other(other) => {
-                let (carried, alignment) = other.carry(&cloth, &source, body).map_err(FitError::Mesh)?;
-                (carried, placed.clone(), Carried::Bones, Some(alignment), 1.0)
-            }
-            Carrier::Registered(registered) => {
-                let carried = registered.carry(&cloth, &source, body).map_err(FitError::Mesh)?;
-                let (alignment, scale) = (registered.alignment_mm, registered.motion.scale);
-                (carried.positions, carried.unrestored, Carried::Registration, Some(alignment), scale)
+            ToModel::Registration(motion) => {
+                let moved: Vec<[f64; 3]> = placed.iter().map(|p| motion.apply(*p)).collect();
+                let unrestored = rest(&moved)?;
+                (restored(moved)?, unrestored)
             }
         };
         let mut moves: Vec<f64> = carried.iter().zip(&base).map(|(a, b)| norm(sub(*a, *b))).collect();
-        let moved_mm = 1e3 * median(&mut moves);
-        let (body, shape) = (self.name.clone(), self.shape.clone());
-        let pelvis = (how != Carried::Registration).then(|| self.placement.translation.map(|x| 0.0 - x));
-        Ok((carried, SourcePlacement { body, shape, carried: how, alignment_mm, pelvis, scale, moved_mm }))
+        let report = SourcePlacement { moved_mm: 1e3 * median(&mut moves), ..self.report.clone() };
+        Ok((carried, report))
     }
 }
 
-/// How a garment lies on its source body.
-struct Lies {
-    /// Share of the vertices deeper inside than [`DEEP`].
-    deep: f64,
-    /// Share of the vertices closer to the skin than [`CLOSE`].
-    close: f64,
-}
-
 /// Cloth this far inside the body (m) is no tight fit any more.
-const DEEP: f64 = 0.025;
+const DEEP_INSIDE: f64 = 0.025;
 /// Cloth this close to the skin (m) rests on it.
-const CLOSE: f64 = 0.05;
+const CLOSE_TO_SKIN: f64 = 0.05;
 
 /// A garment of which a larger share is deep inside was made on another body, or is in other coordinates.
 const MOST_DEEP: f64 = 0.1;
 /// So was one of which a smaller share is close to the skin.
 const LEAST_CLOSE: f64 = 0.1;
 
-impl Lies {
-    fn new(positions: &[[f64; 3]], source: &Surface<f64>) -> Self {
-        let gaps = gaps_to(positions, source);
-        let share = |is: &dyn Fn(&f64) -> bool| {
-            gaps.iter().filter(|g| is(g)).count() as f64 / gaps.len().max(1) as f64
-        };
-        Self { deep: share(&|g| *g < -DEEP), close: share(&|g| g.abs() < CLOSE) }
+/// Where a garment at these signed distances to its source body (m) is, if it does not lie on that.
+fn off_its_body(gaps: &[f64]) -> Option<String> {
+    let share = |is: &dyn Fn(f64) -> bool| {
+        gaps.iter().filter(|gap| is(**gap)).count() as f64 / gaps.len().max(1) as f64
+    };
+    let (deep, close) = (share(&|gap| gap < -DEEP_INSIDE), share(&|gap| gap.abs() < CLOSE_TO_SKIN));
+    let (depth, reach) = (1e3 * DEEP_INSIDE, 1e3 * CLOSE_TO_SKIN);
+    if deep > MOST_DEEP {
+        return Some(format!("{:.0} % of the garment is more than {depth:.0} mm inside it", 100.0 * deep));
     }
-
-    fn implausible(&self) -> Option<String> {
-        if self.deep > MOST_DEEP {
-            let (share, depth) = (100.0 * self.deep, 1e3 * DEEP);
-            return Some(format!("{share:.0} % of the garment is more than {depth:.0} mm inside it"));
-        }
-        let (share, reach) = (100.0 * self.close, 1e3 * CLOSE);
-        (self.close < LEAST_CLOSE)
-            .then(|| format!("only {share:.0} % of the garment is within {reach:.0} mm of its skin"))
-    }
-}
-
-/// Signed distance of every point to the surface (m), positive outside.
-fn gaps_to(positions: &[[f64; 3]], surface: &Surface<f64>) -> Vec<f64> {
-    // Built before it is shared.
-    surface.closest_point();
-    positions.par_iter().with_min_len(64).map(|p| surface.gap(*p, Distance::ClosestPoint).gap).collect()
-}
-
-/// The middle one of some numbers; 0 of none.
-fn median(numbers: &mut [f64]) -> f64 {
-    numbers.sort_by(f64::total_cmp);
-    numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// `body` with these vertices, joints and one shape component, whose bindings cost no more than that. Without a
-/// direction it has none.
-fn one_shape_body(
-    body: &Body,
-    template: Vec<[f64; 3]>,
-    joints: Vec<[f64; 3]>,
-    direction: Option<Vec<f32>>,
-) -> Result<Body, String> {
-    let (shape_count, shape_directions) = direction.map_or((0, Vec::new()), |d| (1, d));
-    Body::new(BodyParts {
-        name: body.name.clone(),
-        faces: body.faces.clone(),
-        template,
-        shape_directions,
-        shape_count,
-        joint_shape_directions: vec![0.0; 3 * shape_count * joints.len()],
-        joint_template: joints,
-        pose_directions: None,
-        skin_weights: body.skin_weights.clone(),
-        parents: body.parents.clone(),
-        joint_names: body.joint_names.clone(),
-    })
-    .map_err(|e| e.to_string())
-}
-
-/// Binds cloth at `positions` to `on`; `target` guesses the category where none is known.
-fn bound(cloth: &Cloth, positions: Vec<[f64; 3]>, on: &Body, target: &Body) -> Result<Binding, String> {
-    let mesh = TriMesh::new(positions, cloth.faces.to_vec()).map_err(|e| e.to_string())?;
-    let category = cloth.category.unwrap_or_else(|| Category::guess(&mesh, target));
-    Ok(Binding::new(&Garment::new(category, mesh), on, &BindingSettings::default()))
+    (close < LEAST_CLOSE)
+        .then(|| format!("only {:.0} % of the garment is within {reach:.0} mm of its skin", 100.0 * close))
 }

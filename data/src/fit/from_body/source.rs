@@ -1,5 +1,6 @@
 //! Which body a garment was made on.
 
+use super::binding::one_shape_body;
 use crate::asset::{Body, BodyFileSettings};
 use crate::format::{FileError, is_mesh_path, load_mesh};
 use crate::mesh::{WELD_SHARE, diagonal, triangulate, weld};
@@ -7,7 +8,6 @@ use clothcombo_physics::TriMesh;
 use clothcombo_physics::mesh::is_inside_out;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// A shape parameter beyond this is a slip of the pen: 99.99 % of people lie within 4.
 const LARGEST_PARAMETER: f64 = 10.0;
@@ -33,13 +33,9 @@ pub(super) enum SourceKind {
 /// A body model in T-pose, its pelvis at the origin.
 #[derive(Clone)]
 pub(super) struct SourceModel {
-    pub body: Body,
     pub shape: Vec<f64>,
-    /// Vertices (m) of this shape.
-    pub positions: Vec<[f64; 3]>,
-    /// Joints (m) of this shape.
-    pub joints: Vec<[f64; 3]>,
-    pub faces: Arc<[[u32; 3]]>,
+    /// Of this shape alone.
+    pub body: Body,
     /// Where the pelvis of this shape is in the coordinates of the file, or of the file that was imported (m).
     pub pelvis: [f64; 3],
 }
@@ -137,9 +133,8 @@ impl SourceModel {
         let body = Body::load(path, &BodyFileSettings { shape_components: usize::MAX })?;
         let shaped = body.shaped(&shape).map_err(|e| wrong(e.to_string()))?;
         let pelvis = body.file_pelvis(&shape);
-        let faces = body.faces.clone();
-        let body = body.with_shape_components(0);
-        Ok(Self { body, shape, positions: shaped.positions, joints: shaped.joints, faces, pelvis })
+        let body = one_shape_body(&body, shaped.positions, shaped.joints, None).map_err(wrong)?;
+        Ok(Self { shape, body, pelvis })
     }
 }
 

@@ -1,13 +1,13 @@
 //! Which way up a person stands, which way it faces, and how it holds its arms: measured on points in metres.
 
-use super::median;
+use super::gaps::median;
 use crate::asset::Body;
-use crate::fit::placement::{Origin, Placement, Unit, UpAxis};
+use crate::fit::placement::{FileOrigin, Placement, Unit};
 use crate::fit::settings::FitSettings;
 use crate::mesh::bounds;
 
 /// Heights of people (m).
-pub(super) const HEIGHTS: [f64; 2] = [1.2, 2.3];
+pub(super) const PERSON_HEIGHTS: [f64; 2] = [1.2, 2.3];
 /// A toe must point forward by this share of the height to say where the front is.
 const LEAST_TOE: f64 = 0.008;
 
@@ -37,27 +37,21 @@ impl Stance {
 
 /// All stances in which the points may be a person: of a plausible height, wider than deep.
 pub(super) fn stances(points: &[[f64; 3]], body: &Body, settings: &FitSettings) -> Vec<Stance> {
-    let ups = settings.up.map_or(UpAxis::USUAL.to_vec(), |up| vec![up]);
-    let turns = settings.turn_degrees.map_or(vec![0.0, 90.0, 180.0, 270.0], |turn| vec![turn]);
     let mut all = Vec::new();
-    for up in ups {
+    for up in settings.ups() {
         let upright = Placement { up, ..Placement::AS_GIVEN }.apply(points);
         let [low, high] = bounds(&upright);
         let height = high[1] - low[1];
-        let is_height = |unit: &Unit| (HEIGHTS[0]..=HEIGHTS[1]).contains(&(height * unit.metres()));
+        let is_height =
+            |unit: &Unit| (PERSON_HEIGHTS[0]..=PERSON_HEIGHTS[1]).contains(&(height * unit.metres()));
         let unit = match settings.unit {
             Some(unit) => Some(unit).filter(is_height),
             None => Unit::ALL.into_iter().find(is_height),
         };
         let Some(unit) = unit else { continue };
-        for turn_degrees in &turns {
-            let placement = Placement {
-                unit,
-                up,
-                turn_degrees: *turn_degrees,
-                origin: Origin::SourceBody,
-                ..Placement::AS_GIVEN
-            };
+        for turn_degrees in settings.turns() {
+            let origin = FileOrigin::SourceBody;
+            let placement = Placement { unit, up, turn_degrees, origin, ..Placement::AS_GIVEN };
             let placed = placement.apply(points);
             let [low, high] = bounds(&placed);
             if high[0] - low[0] > high[2] - low[2] {
@@ -79,6 +73,7 @@ fn measured(placement: Placement, points: &[[f64; 3]], body: &Body) -> Stance {
     let (x, z) = (of(0, &is_trunk), of(2, &is_trunk));
     // The sole is as long as the foot, the shin above it as deep as the heel.
     let (sole, shin) = (of(2, &|p| level(p) < 0.035), of(2, &|p| (0.08..0.16).contains(&level(p))));
+    // Fingers and palms are the last 4 % of the reach.
     let reach = points.iter().map(|p| (p[0] - x).abs()).fold(0.0, f64::max);
     let tip = of(1, &|p| (p[0] - x).abs() > 0.96 * reach);
     Stance {

@@ -1,6 +1,6 @@
-use super::super::limb_pose::limb_pose;
+use super::super::limb_pose::{LimbPose, limb_pose};
 use super::*;
-use crate::asset::{Pose, SparseSkinWeights};
+use crate::asset::{Binding, BindingSettings, BodyParts, Garment, Pose, SparseSkinWeights};
 use crate::fit::{Fitted, fit};
 use crate::format::{NpzWriter, PolygonMesh, obj};
 use crate::generate::garment::generated;
@@ -155,7 +155,7 @@ fn an_origin_above_the_pelvis_is_undone_exactly() {
             let fitted = fit(mesh, &body, &settings).unwrap();
             let [median, p95] = errors(&fitted, &garment);
             assert!(median < 1e-6 && p95 < 1e-6, "{category} {source}: {median} {p95}");
-            assert_eq!(fitted.report.placement.origin, Origin::SourceBody);
+            assert_eq!(fitted.report.placement.origin, FileOrigin::SourceBody);
         }
     }
 }
@@ -194,7 +194,7 @@ fn a_mesh_of_other_vertices_in_an_a_pose_is_registered() {
     let cases: [(&[f64], f64, f64); 2] = [(&[], 0.0, 0.005), (&[0.6, -0.5, 0.4], 7.0, 0.005)];
     for (number, (beta, legs, limit)) in cases.into_iter().enumerate() {
         let other = decimated(&body, beta);
-        let posed = model::Model::new(&other, &[], [40.0, legs]).unwrap();
+        let posed = LimbPose::new(&other, &[], [40.0, legs]).unwrap();
         let up = -posed.positions.iter().map(|p| p[1]).fold(0.0, f64::min);
         let file = at(&folder, &format!("body{number}.obj"));
         obj::save(Path::new(&file), &in_cm_z_up(&posed.positions, up), &other.faces, &[]).unwrap();

@@ -1,43 +1,34 @@
 //! Candidates whose arms hang or whose legs stand apart: judged on bodies posed like them.
 
-use super::super::body_field::BodyField;
-use super::super::climb::{Moves, Steps, climbed};
-use super::super::cloth::Cloth;
-use super::super::judge::{Candidate, Judge};
-use super::super::limb_pose::LimbPose;
-use super::super::placement::{Origin, Placement};
-use super::super::settings::FitSettings;
 use super::{Search, distinct, sort};
-use crate::asset::Body;
+use crate::fit::climb::{ClimbSteps, Moves, climbed};
+use crate::fit::cloth::Cloth;
+use crate::fit::judge::{Candidate, Judge};
+use crate::fit::limb_pose::LimbPose;
+use crate::fit::placement::{FileOrigin, Placement};
+use crate::fit::settings::FitSettings;
 use rayon::prelude::*;
 
 /// Candidates in A-pose worth a body of their own.
 const POSED: usize = 2;
-/// Angles of each leg tried first (degrees), the one for whose weights a body is made, and for how many candidates.
+/// Angles of each leg tried first (degrees), and for how many candidates.
 const LEG_ANGLES: [f64; 7] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0];
-const LEGS_APART: f64 = 6.0;
 const SPREAD: usize = 4;
 /// Angles of each leg (degrees) at which garments are looked for that are worn nowhere else.
 const STANCES: [f64; 2] = [5.0, 10.0];
 /// Openings of a garment for legs.
 const WAIST_AND_LEGS: usize = 3;
 
-/// The field of `body` with its legs [`LEGS_APART`].
-pub(super) fn with_legs_apart(field: &BodyField, body: &Body) -> BodyField {
-    let placement = Placement { leg_angle_degrees: LEGS_APART, ..Placement::AS_GIVEN };
-    field.posed(&LimbPose::of(body, &placement), body)
-}
-
 impl Search<'_> {
     /// The best whose legs stand apart, each by an angle that is found out.
-    pub fn candidates_apart(&self, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Vec<Candidate> {
+    pub fn candidates_apart(&self, cloth: &Cloth, settings: &FitSettings) -> Vec<Candidate> {
         if settings.legs_degrees.is_some() || cloth.borders.len() < WAIST_AND_LEGS {
             return Vec::new();
         }
         let judge = self.judge(cloth, settings);
         let from = |degrees: f64| {
             let known = FitSettings { legs_degrees: Some(degrees), ..settings.clone() };
-            let mut found = self.quick_candidates(cloth, extent, &known);
+            let mut found = self.quick_candidates(cloth, &known);
             found.truncate(SPREAD);
             found.into_par_iter().map(|c| self.climbed_posed(&judge, &c)).collect::<Vec<_>>()
         };
@@ -60,11 +51,11 @@ impl Search<'_> {
             return;
         }
         let at = |c: &Candidate, degrees: f64| Placement { leg_angle_degrees: degrees, ..c.placement };
-        let apart = Judge { field: &self.measured.apart, ..*judge };
+        let apart = Judge { field: self.measured.apart.clone(), ..judge.clone() };
         let has_legs = |c: &&Candidate| LEG_ANGLES.iter().any(|degrees| apart.limbs(&at(c, *degrees)).legs);
         let spread = |candidate: &Candidate| {
             let turned = apart.turned(&candidate.placement, None, true);
-            let scored = |degrees: &f64| apart.scored(at(candidate, *degrees), &turned, true, None);
+            let scored = |degrees: &f64| apart.scored(Candidate::at(at(candidate, *degrees)), &turned, true);
             let best = LEG_ANGLES.iter().map(scored).max_by(|a, b| a.score.total_cmp(&b.score));
             let start = apart.with_openings(best?);
             let near = if start.placement.arm_angle_degrees == 0.0 { &apart } else { judge };
@@ -80,21 +71,19 @@ impl Search<'_> {
 
     /// The best near a candidate on a body in its pose.
     fn climbed_posed(&self, judge: &Judge, candidate: &Candidate) -> Candidate {
-        let is_posed = judge.field.is_posed(&candidate.placement);
-        let posed = if is_posed { None } else { self.posed_field(&candidate.placement) };
-        let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..*judge };
-        let moves = if candidate.placement.origin == Origin::Elsewhere { Moves::All } else { Moves::Limbs };
-        let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true, moves };
+        let judge = self.posed_judge(judge, &candidate.placement);
+        let moves =
+            if candidate.placement.origin == FileOrigin::Elsewhere { Moves::All } else { Moves::Limbs };
+        let steps = ClimbSteps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true, moves };
         judge.judged(climbed(&judge, candidate, &steps).placement)
     }
 
-    /// The body in a garment's pose; none at rest.
-    pub(super) fn posed_field(&self, placement: &Placement) -> Option<BodyField> {
-        let is_posed = !has_limbs_at_rest(placement);
-        is_posed.then(|| self.measured.field.posed(&LimbPose::of(self.body, placement), self.body))
+    /// The same judge on a body whose limbs are held as a garment's.
+    pub(super) fn posed_judge<'b>(&self, judge: &Judge<'b>, placement: &Placement) -> Judge<'b> {
+        if placement.has_limbs_at_rest() || judge.field.is_posed(placement) {
+            return judge.clone();
+        }
+        let field = self.measured.field.posed(&LimbPose::of(self.body, placement), self.body);
+        Judge { field, ..judge.clone() }
     }
-}
-
-pub(super) fn has_limbs_at_rest(placement: &Placement) -> bool {
-    (placement.arm_angle_degrees, placement.leg_angle_degrees) == (0.0, 0.0)
 }

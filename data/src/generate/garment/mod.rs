@@ -33,7 +33,6 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 pub use error::GarmentError;
-pub(crate) use tube::Tube;
 
 /// Relative spread of the number of vertices over seeds.
 const RESOLUTION_SPREAD: f64 = 0.25;

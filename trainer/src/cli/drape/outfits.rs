@@ -3,7 +3,7 @@
 use super::job::{Job, RequestedGarment, SceneArguments, ordered};
 use clothcombo_data::asset::GarmentMaterial;
 use clothcombo_data::fit::FitSettings;
-use clothcombo_data::fit::hints::GarmentEntry;
+use clothcombo_data::fit::hints::GarmentHints;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde::Deserialize;
 use std::collections::HashSet;
@@ -126,7 +126,7 @@ fn garment(
     match value {
         toml::Value::String(name) => Ok(RequestedGarment { name, hints: hints.clone(), material }),
         toml::Value::Table(table) => {
-            let entry: GarmentEntry =
+            let entry: GarmentHints =
                 table.try_into().map_err(|e: toml::de::Error| e.message().to_owned())?;
             entry.material.check()?;
             let material = entry.material.or(material);

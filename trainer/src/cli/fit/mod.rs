@@ -9,10 +9,9 @@ use crate::cli::verbosity::spinner;
 use crate::dataset::load_body;
 use crate::system::paths::{lossy, lossy_option};
 use clap::Parser;
-use clothcombo_data::fit::hints::Arms;
-use clothcombo_data::fit::{FitReport, FitSettings, fit};
+use clothcombo_data::fit::{FitReport, fit};
 use miette::{IntoDiagnostic, Report, miette};
-use output::{Form, check_output, read, save};
+use output::{OutputForm, check_output, read, save};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -48,36 +47,23 @@ pub struct Arguments {
     with_thickness: bool,
     #[command(flatten)]
     hints: FitArguments,
-    /// The earlier name of --arms
-    #[arg(long, hide = true, conflicts_with = "arms", value_name = "ARMS")]
-    pose: Option<String>,
     /// Print the report as JSON; elements are counted from 0
     #[arg(long)]
     json: bool,
 }
 
 impl Arguments {
-    fn settings(&self) -> Result<FitSettings, Report> {
-        let settings = self.hints.settings().into_diagnostic()?;
-        let arms = match self.pose.as_deref() {
-            None => return Ok(settings),
-            Some("auto") => None,
-            Some(pose) => Some(pose.parse::<Arms>().map_err(|e| miette!("--pose: {e}, auto"))?),
-        };
-        Ok(FitSettings { arms_lowered: arms.map(|arms| arms == Arms::A), ..settings })
-    }
-
-    fn form(&self) -> Form {
+    fn form(&self) -> OutputForm {
         match (self.triangles, self.with_thickness) {
-            (true, _) => Form::Triangles,
-            (_, true) => Form::Whole,
-            _ => Form::Repaired,
+            (true, _) => OutputForm::Triangles,
+            (_, true) => OutputForm::Whole,
+            _ => OutputForm::Repaired,
         }
     }
 }
 
 #[derive(Serialize)]
-struct Output<'a> {
+struct FitOutput<'a> {
     #[serde(serialize_with = "lossy")]
     garment: &'a Path,
     body: &'a str,
@@ -93,7 +79,7 @@ struct Output<'a> {
 /// # Errors
 /// When a file cannot be read or written, or the mesh is no garment of this body.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let settings = arguments.settings()?;
+    let settings = arguments.hints.settings().into_diagnostic()?;
     arguments
         .output
         .as_deref()
@@ -111,7 +97,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         comments.extend(report.assumptions().into_iter().map(|a| format!("assumed: {a}")));
         save(output, &given, &fitted, arguments.form(), &comments)?;
     }
-    let output = Output {
+    let output = FitOutput {
         garment: &arguments.garment,
         body: &body.name,
         output: arguments.output.as_deref(),

@@ -19,7 +19,7 @@ pub(super) struct Given {
 
 /// Which faces are written.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Form {
+pub(super) enum OutputForm {
     /// The file's, as far as they are still true.
     Repaired,
     /// Triangles.
@@ -61,37 +61,35 @@ pub(super) fn save(
     output: &Path,
     given: &Given,
     fitted: &Fitted,
-    form: Form,
+    form: OutputForm,
     comments: &[String],
 ) -> Result<(), Report> {
     let rest = &fitted.garment.rest;
     // Materials are named in the file: by a name that can be written there.
     let name = output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let moved = match (form, &given.obj) {
-        (Form::Triangles, _) => {
+    let (positions, faces) = match form {
+        OutputForm::Triangles => {
             return obj::save(output, rest.positions(), rest.faces(), comments).into_diagnostic();
         }
-        (Form::Repaired, Some(bytes)) => {
-            let (positions, origin) = (rest.positions(), &fitted.vertex_origin);
-            let form = RepairedForm { positions, vertex_origin: origin, faces: &fitted.file_faces };
-            MovedObj::repaired(&given.path, bytes, &form, &name).ok()
-        }
-        (Form::Whole, Some(bytes)) => {
-            let positions = fitted.in_file_order(rest.positions());
-            MovedObj::new(&given.path, bytes, &positions, &name).ok()
-        }
-        (Form::Repaired, None) => {
-            return save_file_faces(output, rest.positions(), &fitted.file_faces, &given.mesh, comments)
-                .into_diagnostic();
-        }
-        (Form::Whole, None) => {
-            let positions = fitted.in_file_order(rest.positions());
+        OutputForm::Repaired => (rest.positions().to_vec(), fitted.file_faces.clone()),
+        OutputForm::Whole => {
             let whole = |(face, polygon): (usize, &[u32])| FileFace {
                 face: face as u32,
                 corners: polygon.iter().copied().zip(0..).map(<[u32; 2]>::from).collect(),
             };
-            let faces: Vec<FileFace> = given.mesh.polygons().enumerate().map(whole).collect();
-            return save_file_faces(output, &positions, &faces, &given.mesh, comments).into_diagnostic();
+            let faces = given.mesh.polygons().enumerate().map(whole).collect();
+            (fitted.in_file_order(rest.positions()), faces)
+        }
+    };
+    let Some(bytes) = &given.obj else {
+        return save_file_faces(output, &positions, &faces, &given.mesh, comments).into_diagnostic();
+    };
+    let moved = match form {
+        OutputForm::Whole => MovedObj::new(&given.path, bytes, &positions, &name).ok(),
+        _ => {
+            let form =
+                RepairedForm { positions: &positions, vertex_origin: &fitted.vertex_origin, faces: &faces };
+            MovedObj::repaired(&given.path, bytes, &form, &name).ok()
         }
     };
     let moved = moved.ok_or_else(|| {
