@@ -3,7 +3,7 @@
 use crate::arrays::{MeshInput, array, arrays_of_mesh, from_json, named, triangles};
 use crate::body::PyBody;
 use crate::call::call;
-use crate::model::{GarmentInput, RequestedGarment, resolve_settings};
+use crate::model::{GarmentInput, GarmentRequest, resolve_settings};
 use clothcombo_data::check::{Checker, FileCheck, find_targets, only_body};
 use clothcombo_data::fit;
 use clothcombo_data::format::load_mesh;
@@ -28,7 +28,7 @@ pub fn fit_garment<'py>(
     garment: GarmentInput,
     body: &PyBody,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyAny>)> {
-    let garment = RequestedGarment::new(garment)?;
+    let garment = GarmentRequest::new(garment)?;
     let files: Vec<PathBuf> = garment.file().into_iter().collect();
     let fitted = call(py, &files, || {
         let (name, hints) = (garment.name.clone(), garment.hints()?);

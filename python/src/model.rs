@@ -83,13 +83,13 @@ pub struct PyOutfit {
 pub type GarmentInput = (String, MeshInput, String);
 
 /// The same with its hints read.
-pub struct RequestedGarment {
+pub struct GarmentRequest {
     pub name: String,
     pub mesh: MeshInput,
     pub entry: GarmentHints,
 }
 
-impl RequestedGarment {
+impl GarmentRequest {
     pub fn new((name, mesh, hints): GarmentInput) -> PyResult<Self> {
         Ok(Self { entry: to_value(&hints, &name)?, name, mesh })
     }
@@ -180,8 +180,8 @@ impl PyModel {
 
     /// Reads, places and embeds garments, innermost first.
     fn outfit(&self, py: Python<'_>, garments: Vec<GarmentInput>, fit: Option<bool>) -> PyResult<PyOutfit> {
-        let wanted = garments.into_iter().map(RequestedGarment::new).collect::<PyResult<Vec<_>>>()?;
-        let files: Vec<PathBuf> = wanted.iter().filter_map(RequestedGarment::file).collect();
+        let wanted = garments.into_iter().map(GarmentRequest::new).collect::<PyResult<Vec<_>>>()?;
+        let files: Vec<PathBuf> = wanted.iter().filter_map(GarmentRequest::file).collect();
         call(py, &files, || {
             let found = wanted.into_iter().map(|garment| garment.find(&self.catalog, &self.draper, fit));
             let sources = found.collect::<Result<Vec<_>, Report>>()?;

@@ -48,7 +48,7 @@ pub struct FileWarnings {
 }
 
 /// A file, the name of what it holds, and how to check it.
-struct CheckedFile {
+struct ListedFile {
     name: String,
     target: Target,
 }
@@ -61,7 +61,7 @@ impl DataCheck {
     pub fn run(config: &Config, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Self, DatasetError> {
         DatasetError::check_inputs(config)?;
         let sources = GarmentSource::list(&config.data.garments)?;
-        let mut files: Vec<CheckedFile> = sources.into_iter().filter_map(garment).collect();
+        let mut files: Vec<ListedFile> = sources.into_iter().filter_map(garment).collect();
         if let Some(folder) = &config.data.poses.motions {
             files.extend(list_motion_folder(folder).map_err(DatasetError::data)?.into_iter().map(motion));
         }
@@ -77,7 +77,7 @@ impl DataCheck {
         }
         let checker = Checker::new(body);
         let done = AtomicUsize::new(0);
-        let check = |file: &CheckedFile| {
+        let check = |file: &ListedFile| {
             let found = checker.check(&file.target);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, files.len());
             found
@@ -95,20 +95,20 @@ impl DataCheck {
     }
 }
 
-fn garment(source: GarmentSource) -> Option<CheckedFile> {
+fn garment(source: GarmentSource) -> Option<ListedFile> {
     let GarmentSource::File(ListedGarment { path, name, category, holding, layer, .. }) = source else {
         return None;
     };
     let entry = ManifestHints { category, layer, holding };
-    Some(CheckedFile { name, target: Target::Garment { path, entry } })
+    Some(ListedFile { name, target: Target::Garment { path, entry } })
 }
 
-fn motion(path: PathBuf) -> CheckedFile {
+fn motion(path: PathBuf) -> ListedFile {
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    CheckedFile { name, target: Target::Npz { path } }
+    ListedFile { name, target: Target::Npz { path } }
 }
 
-fn fault(file: &CheckedFile, found: &FileCheck, reason: &str, body: &str) -> Fault {
+fn fault(file: &ListedFile, found: &FileCheck, reason: &str, body: &str) -> Fault {
     let path = found.path.display().to_string();
     let remedy = match found.garment {
         Some(_) => format!("clothcombo fit {path} --body {body} -o {}.obj", file.name),
