@@ -4,7 +4,7 @@ use super::body::SoftBody;
 use super::budget::Budget;
 use super::clearance::{Clearance, YieldedBody};
 use super::count::certified;
-use super::fast_pass::fast_pass;
+use super::fast_pass::{FEW_SELF_PAIRS, fast_pass};
 use super::garment::{at, check};
 use super::obstacle::BodyObstacle;
 use super::task::Task;
@@ -18,8 +18,6 @@ use crate::query::Surface;
 const AGAIN: [(f64, usize); 3] = [(1.0, 1), (0.3, 1), (3.0, 2)];
 /// Most pairs that may be left for them: more would only be stretched further.
 pub(super) const FEW_PAIRS: usize = 32;
-/// Self-intersecting pairs that may be left where nothing else intersects.
-pub(super) const FEW_SELF_PAIRS: usize = 8;
 
 /// The fast pass and, if it does not clear the outfit, the first attempts. If those do not either, `further` goes on from the
 /// body and the result so far. Before that the body yields only if at most `most` pairs are left.
