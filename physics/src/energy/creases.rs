@@ -25,7 +25,7 @@ use crate::vec3::{add, add_scaled, axpy, dot, norm_squared, scale, sub, to_f64};
 const SMOOTH_WIDTHS: f64 = 12.0;
 
 /// Sweeps over all creases until their combinations are least.
-const SWEEPS: usize = 30;
+const CREASE_SWEEPS: usize = 30;
 
 /// All points in contact with two or more sides.
 pub(crate) struct Creases<'a>(Vec<Crease<'a>>);
@@ -119,7 +119,7 @@ impl Creases<'_> {
             weights
         };
         let mut weights: Vec<Vec<f64>> = self.0.iter().map(first).collect();
-        for _ in 0..SWEEPS {
+        for _ in 0..CREASE_SWEEPS {
             for (crease, weights) in self.0.iter().zip(&mut weights) {
                 for k in 0..weights.len() {
                     for l in 0..k {

@@ -25,6 +25,8 @@ use super::{ResolveSettings, Resolved};
 use crate::contact::step_filter::{ContactMesh, FacePairs, StepFilter};
 use rayon::prelude::*;
 
+/// Self-intersecting pairs that may be left where nothing else intersects.
+pub(super) const FEW_SELF_PAIRS: usize = 8;
 /// Rings of neighbours around a defect that move along.
 const RINGS: usize = 2;
 /// Sweeps of the relaxation in a round.
