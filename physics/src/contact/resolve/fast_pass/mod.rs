@@ -41,8 +41,6 @@ const FREE_STALLS: usize = 3;
 const STALLS: usize = 5;
 /// More intersections than this after a round that hardly helped are not for the fast pass.
 const MANY: usize = 200;
-/// Self-intersecting pairs that may be left where nothing else intersects.
-pub(super) const FEW_SELF_PAIRS: usize = 8;
 /// Distance to which sheets of one garment are separated, as a share of the gap.
 const SELF_GAP: f64 = 0.25;
 /// A share of vertices under an inner garment from which whole parts lie on the wrong side without intersecting anything.
