@@ -63,7 +63,7 @@ fn both_layouts_are_found_in_nested_folders_and_stand_up() {
     // Gender as text, as bytes, and as Python prints bytes.
     let about: Vec<&str> = summary.taken.iter().map(|(_, about)| about.as_str()).collect();
     assert!(about.iter().any(|about| about.ends_with(", female")), "{about:?}");
-    assert!(about.iter().any(|about| about.ends_with(", male")), "{about:?}");
+    assert!(about.iter().any(|about| about.contains(", male")), "{about:?}");
     assert!(!about.concat().contains("b'"), "{about:?}");
 
     // Everything else is skipped with its reason.

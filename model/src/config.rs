@@ -77,7 +77,7 @@ pub struct ModelConfig {
     /// Table 4: the garment embedding `z̄_v` replaces it at every vertex.
     pub vertex_embedding: bool,
     /// Length of the code of the pose around a joint, which every vertex reads through its skin weights, beside the thickness
-    /// of what is worn below it; 0 is the paper, which has neither: its networks see the pose only through `z_s`, one row per
+    /// of the garments below it; 0 is the paper, which has neither: its networks see the pose only through `z_s`, one row per
     /// garment.
     pub surroundings: usize,
 }

@@ -1,4 +1,4 @@
-//! What a vertex knows of its surroundings: the pose of the joints that move it, and how thick what is worn below it is.
+//! What a vertex knows of its surroundings: the pose of the joints that move it, and how thick the garments below it are.
 //!
 //! In the paper every vertex reads the pose from z_s, one row per garment, in which the angles of all joints compete for
 //! room. What a sleeve does depends on the shoulder and the elbow alone: a network that is told so learns it from fewer poses, and

@@ -5,7 +5,7 @@ use burn::tensor::Tensor;
 #[cfg(feature = "gpu")]
 use super::{gpu, host::lies_on_host};
 
-/// `decay · old + (1 − decay) · new`, of one shape; not tracked by autodiff.
+/// `decay · old + (1 − decay) · new`, of one shape, of tensors that autodiff does not track.
 pub fn blend<const D: usize>(old: Tensor<D>, new: Tensor<D>, decay: f64) -> Tensor<D> {
     #[cfg(feature = "gpu")]
     if !lies_on_host(&old) {

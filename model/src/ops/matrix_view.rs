@@ -22,6 +22,8 @@ impl<'a> MatrixView<'a> {
         [rows, columns]: [usize; 2],
         [row_stride, column_stride]: [usize; 2],
     ) -> Self {
+        // One column is contiguous, whatever step leads to the next one.
+        let column_stride = if columns < 2 { 1 } else { column_stride };
         let last = |count: usize, stride| count.saturating_sub(1) * stride;
         let last = last(rows, row_stride) + last(columns, column_stride);
         assert!(rows * columns == 0 || last < values.len(), "a matrix beyond its memory");

@@ -140,6 +140,8 @@ fn products_match_burns_own() {
     );
 }
 
+// The host has no form of its own.
+#[cfg(feature = "gpu")]
 #[test]
 fn sine_modulation_matches_burns_own() {
     for omega in [1.0, 30.0] {
@@ -151,6 +153,8 @@ fn sine_modulation_matches_burns_own() {
     }
 }
 
+// The host has no form of its own.
+#[cfg(feature = "gpu")]
 #[test]
 fn gradient_features_match_burns_own() {
     compare(

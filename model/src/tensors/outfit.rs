@@ -32,7 +32,7 @@ pub struct OutfitTensors {
     pub skin_weights: Tensor<2>,
     /// Active joints of each garment, 0 or 1 `[M,J]`.
     pub joint_mask: Tensor<2>,
-    /// Thickness of what is worn below each vertex `[ΣV,1]` (cm, so that the numbers are about one); absent where nothing is.
+    /// Thickness of the garments below each vertex `[ΣV,1]` (cm, so that the numbers are about one); absent where nothing is.
     pub thickness_below: Option<Tensor<2>>,
     pub(crate) packing: Packing,
     pub(crate) edges: Option<ForceEdges>,
@@ -82,7 +82,7 @@ impl OutfitTensors {
         })
     }
 
-    /// The same with the thickness of what is worn below each vertex `[ΣV]` (m); empty where nothing is.
+    /// The same with the thickness of the garments below each vertex `[ΣV]` (m); empty where nothing is.
     ///
     /// # Errors
     /// Another number of vertices, or a number that is not finite.

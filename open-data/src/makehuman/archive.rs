@@ -7,6 +7,9 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 use tar::Archive;
 
+/// Larger files are no proxies (bytes).
+const LARGEST_PROXY: u64 = 64 << 20;
+
 /// Whether a path in the package is a clothing proxy: `…/proxies/clothes/<name>/<name>.json`.
 fn is_proxy(path: &Path) -> bool {
     let parts: Vec<_> = path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
@@ -36,11 +39,11 @@ fn from_tarball(package: &Path) -> std::io::Result<Vec<(String, Vec<u8>)>> {
     let mut archive = Archive::new(GzDecoder::new(BufReader::new(File::open(package)?)));
     let mut proxies = Vec::new();
     for entry in archive.entries()? {
-        let mut entry = entry?;
+        let entry = entry?;
         let path = entry.path()?.into_owned();
-        if is_proxy(&path) {
+        if is_proxy(&path) && entry.size() < LARGEST_PROXY {
             let mut bytes = Vec::new();
-            entry.read_to_end(&mut bytes)?;
+            entry.take(LARGEST_PROXY).read_to_end(&mut bytes)?;
             proxies.push((stem(&path), bytes));
         }
     }

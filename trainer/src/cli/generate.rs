@@ -59,7 +59,15 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let body = load_body(&arguments.body, 0)?;
     let maker = GarmentMaker::new(arguments, &body)?;
-    let wanted: Vec<WantedFile> = (0..arguments.count as u64).map(|i| maker.wanted(arguments, i)).collect();
+    let count = arguments.count as u64;
+    if arguments.start.checked_add(count).is_none() {
+        return Err(miette!(
+            help = format!("numbers of garments end at {}: begin earlier", u64::MAX),
+            "--start {} leaves no numbers for {count} garments",
+            arguments.start
+        ));
+    }
+    let wanted: Vec<WantedFile> = (0..count).map(|i| maker.wanted(arguments, i)).collect();
     let folder = &arguments.output;
     // Before anything is made: a folder that holds other garments stays as it is.
     wanted.iter().try_for_each(|garment| maker.check(garment))?;
@@ -140,7 +148,7 @@ impl<'a> GarmentMaker<'a> {
             [] => &Category::ALL,
             some => some,
         };
-        let index = arguments.start.wrapping_add(i);
+        let index = arguments.start + i;
         let category = categories[(index % categories.len() as u64) as usize];
         let seed = arguments.seed.wrapping_add(index);
         let path = self.folder.join(format!("{}.obj", GarmentGenerator::name(category, seed)));

@@ -24,10 +24,11 @@ impl PostProcessArguments {
     }
 }
 
-/// What to do about `pairs` that are left, or a budget that ended the post-process.
+/// What to do about `pairs` that are left, and whether a budget ended the post-process.
 pub fn left_over(pairs: usize, is_stopped: bool) -> Option<String> {
     let (stopped, longer) = match (is_stopped, pairs) {
         (false, 0) => return None,
+        (true, 0) => return Some("stopped after its budget; no pairs left".to_owned()),
         (false, _) => ("", ""),
         (true, _) => ("stopped after its budget, ", "a longer --time-limit if there is one, "),
     };

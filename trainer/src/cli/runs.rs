@@ -18,7 +18,7 @@ pub struct Arguments {
     /// A folder of runs, or one run
     #[arg(value_name = "DIR", default_value = "runs")]
     folder: PathBuf,
-    /// RunOrder of the rows
+    /// Order of the rows
     #[arg(long, value_enum, default_value_t = RunOrder::Name)]
     sort: RunOrder,
     /// Print JSON instead of a table

@@ -204,7 +204,7 @@ mod tests {
             load(written(SMALL).path(), &settings.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>())
         };
         let unseen = load(&["stages.0.below=2"]).unwrap_err().to_string();
-        assert!(unseen.contains("do not see what is worn below"), "{unseen}");
+        assert!(unseen.contains("do not see the garments below"), "{unseen}");
         assert_eq!(
             load(&["stages.0.below=2", "model.surroundings=8"]).unwrap().layer_thickness(),
             Some(0.002)

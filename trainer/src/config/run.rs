@@ -83,7 +83,7 @@ impl Config {
             if stage.below > 0 && self.model.surroundings == 0 {
                 return Some((
                     format!("stages[{i}].below"),
-                    "the networks do not see what is worn below".into(),
+                    "the networks do not see the garments below".into(),
                     "set model.surroundings, for example to 64, or below = 0".into(),
                 ));
             }

@@ -241,7 +241,7 @@ impl SceneBuilder<'_> {
     }
 }
 
-/// Thickness (m) of what is worn below every vertex of `garments`, inner → outer `[ΣV]`: of those `below` them all and of those
+/// Thickness (m) of the garments below every vertex of `garments`, inner → outer `[ΣV]`: of those `below` them all and of those
 /// nearer to the body, `each` as thick; empty where nothing is.
 fn thickness_below(
     garments: &[Arc<PreparedGarment>],

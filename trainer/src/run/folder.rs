@@ -1,12 +1,9 @@
 //! The folder of a run: where everything lies, created whole or not at all.
 
-mod error;
-
-pub use error::RunDirError;
-
 use crate::config::{Config, load, to_toml};
 use crate::dataset::SplitNames;
 use crate::run::difference::{AllowedChanges, differences, differing_keys};
+use crate::run::error::RunDirError;
 use crate::run::lock::{LOCK_FILE, RunLock};
 use crate::system::files::check_writable;
 use crate::system::paths::obstacle;

@@ -2,7 +2,7 @@
 //!
 //! The system drops the lock when the process ends, however it ends: nothing has to be cleaned up after a `kill -9`.
 
-use super::folder::RunDirError;
+use super::error::RunDirError;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;

@@ -3,6 +3,7 @@
 
 pub mod checkpoint;
 pub mod difference;
+pub mod error;
 pub mod event;
 pub mod folder;
 pub mod lock;

@@ -18,7 +18,7 @@ use clothcombo_physics::{Surface, TriMesh};
 const REGISTERED_POINTS: usize = 2500;
 /// Rounds in which stances are compared, and then the best one is refined.
 const ICP_ROUNDS: [usize; 2] = [8, 24];
-/// ClimbSteps by which the angles of arms and legs are refined (degrees).
+/// Steps by which the angles of arms and legs are refined (degrees).
 const LIMB_STEPS: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
 /// Most steps of one length.
 const MOST_LIMB_STEPS: usize = 4;

@@ -80,7 +80,7 @@ impl SameModel {
                 for (p, row) in shaped.iter_mut().zip(rows) {
                     let weighted = bones.iter().zip(row).map(|(bone, w)| (bone, f64::from(*w)));
                     *p = unskin(*p, weighted)
-                        .ok_or("the pose cannot be undone: a blended bone transform has no inverse")?;
+                        .ok_or("the pose of the source body cannot be undone: a blended bone transform has no inverse")?;
                 }
             }
             let moved = binding.shape_displacement(&[1.0], 1);

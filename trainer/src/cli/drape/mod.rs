@@ -80,8 +80,8 @@ pub struct Arguments {
     #[arg(long, value_name = "KEY=VALUE,…", value_parser = GarmentMaterial::from_str)]
     material: Option<GarmentMaterial>,
     /// Steps of the static solver after networks and post-process that make no intersection, at most 2 cm each, until a vertex
-    /// is 5 cm from there; 0: none, at most 1000; `auto`: until a step gains less than 1 % of what all did, for at most two seconds [default: 4
-    /// for one pose, 0 for a motion]
+    /// is 5 cm from there: at most 1000, 0 for none; `auto`: until a step gains less than 1 % of what all did, for at most two
+    /// seconds [default: 4 for one pose, 0 for a motion]
     #[arg(long, value_name = "STEPS|auto")]
     refine: Option<RefineSteps>,
     /// Leaves out the post-process; the certificate still counts everything

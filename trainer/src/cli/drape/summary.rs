@@ -111,7 +111,7 @@ fn certificate(report: &DrapeReport) -> String {
         let percent = (1e3 * strain).round() / 10.0 + 0.0;
         text += &format!(", strain {percent:+.1} %{worst}");
     }
-    if let Some(left) = left_over(found.between(), found.is_stopped) {
+    if let Some(left) = left_over(found.pairs(), found.is_stopped) {
         text += &format!("\n{left}");
     }
     let pinched = found.pinched.count();
