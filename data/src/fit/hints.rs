@@ -110,7 +110,10 @@ pub fn offset(text: &str) -> Result<[f64; 3], String> {
     let wrong = || format!("'{text}' is not three numbers in metres such as 0,0.95,0");
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
     let numbers: [f64; 3] = numbers.map_err(|_| wrong())?.try_into().map_err(|_| wrong())?;
-    within_reach(numbers, text)
+    match numbers.iter().all(|x| x.is_finite()) {
+        true => within_reach(numbers, text),
+        false => Err(wrong()),
+    }
 }
 
 /// `numbers` (m), called `text`.

@@ -130,7 +130,11 @@ pub(super) fn write_motions(
     let mut summary = Summary::default();
     let (mut done, mut frames, mut seconds) = (0, 0, 0.0);
     for chunk in inputs.chunks(16) {
-        let clips: Vec<_> = chunk.par_iter().map(|input| import(&input.path)).collect();
+        let import = |input: &NamedFile| match input.path.is_dir() {
+            true => Err("a folder; name the files in it".to_owned()),
+            false => import(&input.path),
+        };
+        let clips: Vec<_> = chunk.par_iter().map(import).collect();
         for (NamedFile { path, name }, clip) in chunk.iter().zip(clips) {
             done += 1;
             progress("importing motions", done, inputs.len());

@@ -102,8 +102,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     };
     let device = arguments.device.open()?;
     let model = model(arguments, &trained, config, &device)?;
-    let ablations = named_models(arguments, &arguments.ablation, &model, &device)?;
-    let specific = named_models(arguments, &arguments.specific, &model, &device)?;
+    let ablations = named_models(arguments, "--ablation", &arguments.ablation, &model, &device)?;
+    let specific = named_models(arguments, "--specific", &arguments.specific, &model, &device)?;
     check_specific(&specific, &model.dataset)?;
     check_ablations(&ablations, &model)?;
     // Now, not after all the work; nothing is made before that.
@@ -177,16 +177,18 @@ fn model(
 /// Further models, each with its own data, measured by the losses of `first` on scenes of its seed.
 fn named_models(
     arguments: &Arguments,
+    flag: &str,
     named: &[(String, PathBuf)],
     first: &ModelUnderTest,
     device: &Device,
 ) -> Result<Vec<NamedModel>, Report> {
     let named_model = |(name, path): &(String, PathBuf)| {
-        let trained = TrainedModel::open(path)?;
+        let trained = TrainedModel::open(path).wrap_err_with(|| format!("{flag} \"{name}\""))?;
         let mut config = trained.config.clone();
         config.losses = first.config.losses.clone();
         config.validation.seed = Some(first.config.validation_seed());
-        let model = model(arguments, &trained, config, device).wrap_err_with(|| name.clone())?;
+        let model =
+            model(arguments, &trained, config, device).wrap_err_with(|| format!("{flag} \"{name}\""))?;
         Ok(NamedModel { name: name.clone(), model })
     };
     named.iter().map(named_model).collect()

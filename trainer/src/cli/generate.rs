@@ -5,6 +5,7 @@ use crate::cli::values::{count, folder_to_make, picture_file};
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::dataset::load_body;
 use crate::picture::save_png;
+use crate::system::files::check_writable;
 use clap::Parser;
 use clothcombo_data::asset::{Body, Category, Garment};
 use clothcombo_data::folders::{ManifestEntry, read_manifest, refuse_unlisted, save_garment, save_manifest};
@@ -69,6 +70,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     }
     let wanted: Vec<WantedFile> = (0..count).map(|i| maker.wanted(arguments, i)).collect();
     let folder = &arguments.output;
+    if let Some(path) = &arguments.picture {
+        check_writable(path).into_diagnostic().wrap_err_with(|| format!("--picture {}", path.display()))?;
+    }
     // Before anything is made: a folder that holds other garments stays as it is.
     wanted.iter().try_for_each(|garment| maker.check(garment))?;
     refuse_unlisted(folder, &wanted.iter().map(|g| g.path.clone()).collect()).into_diagnostic()?;

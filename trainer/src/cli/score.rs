@@ -10,23 +10,23 @@ use std::path::PathBuf;
 /// Scores draped garments: energies in the paper's printed form, penetration, exact intersections, layer order
 #[derive(Parser)]
 #[command(
-    after_help = "Files are OBJ meshes in metres, y up; quads and polygons are cut into triangles. A draped mesh has the\n\
-                  vertices and faces of its rest mesh.\n\n\
+    after_help = "Files are OBJ, PLY, STL or glTF meshes in metres, y up; quads and polygons are cut into triangles. A draped mesh\n\
+                  has the vertices and faces of its rest mesh.\n\n\
                   Example (inner to outer):\n  clothcombo score --body body.obj --rest rest/tee.obj rest/coat.obj \
                   --draped draped/tee.obj draped/coat.obj --json"
 )]
 pub struct Arguments {
     /// The posed body
-    #[arg(long, value_name = "OBJ")]
+    #[arg(long, value_name = "MESH")]
     body: PathBuf,
     /// Rest meshes, innermost first
-    #[arg(long, num_args = 1.., required = true, value_name = "OBJ")]
+    #[arg(long, num_args = 1.., required = true, value_name = "MESH")]
     rest: Vec<PathBuf>,
     /// Draped meshes, in the same order
-    #[arg(long, num_args = 1.., required = true, value_name = "OBJ")]
+    #[arg(long, num_args = 1.., required = true, value_name = "MESH")]
     draped: Vec<PathBuf>,
     /// The meshes before skinning, in the same order: adds the holding energy against the rest meshes
-    #[arg(long, num_args = 1.., value_name = "OBJ")]
+    #[arg(long, num_args = 1.., value_name = "MESH")]
     canonical: Vec<PathBuf>,
     /// Distances to the closest point of the body's surface instead of its nearest vertex
     #[arg(long)]

@@ -27,7 +27,7 @@ pub(super) fn reworded(message: &str) -> String {
     let said = |at: usize| match (at.checked_sub(1).map(|before| words[before]), words[at]) {
         (Some("struct"), _) => None,
         (_, "struct") => Some("a table"),
-        (_, "u64" | "u32" | "usize") => Some("a whole number"),
+        (_, "u64" | "u32" | "usize") => Some("a whole number from 0"),
         (_, "f64" | "f32") => Some("a number"),
         (_, word) => Some(word),
     };

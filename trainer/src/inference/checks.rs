@@ -2,7 +2,7 @@
 
 use super::bodies::{Bodies, BodyState, check_body_mesh};
 use super::draper::Draper;
-use super::embedded::MAX_GARMENT_VERTICES;
+use super::embedded::MAX_DRAPED_VERTICES;
 use super::source::GivenGarment;
 use clothcombo_data::asset::{Garment, Pose, PosedBody, infeasible_pair};
 use clothcombo_data::check::{impossible_turn, not_radians, not_upright};
@@ -105,10 +105,10 @@ pub(super) fn check_sizes(garments: &[GivenGarment]) -> Result<(), Report> {
     }
     for Garment { name, rest, .. } in garments.iter().map(|source| &source.garment) {
         let vertices = rest.vertex_count();
-        if vertices > MAX_GARMENT_VERTICES {
+        if vertices > MAX_DRAPED_VERTICES {
             return Err(miette!(
                 help = "decimate it first: the networks see no detail of a millimetre",
-                "garment '{name}' has {vertices} vertices, more than {MAX_GARMENT_VERTICES} can be draped at once"
+                "garment '{name}' has {vertices} vertices, more than {MAX_DRAPED_VERTICES} can be draped at once"
             ));
         }
     }

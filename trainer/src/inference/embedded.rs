@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Most vertices of a garment: at the paper's sizes the operators of one take 2 kB a vertex, its embedding as much.
-pub const MAX_GARMENT_VERTICES: usize = 100_000;
+pub const MAX_DRAPED_VERTICES: usize = 100_000;
 /// Memory of a vertex of a garment at the paper's sizes (bytes): 2 kB are operators, as much the embedding.
 const BYTES_PER_VERTEX: usize = 4096;
 
@@ -36,7 +36,7 @@ pub(super) struct EmbeddedGarments {
 
 impl Default for EmbeddedGarments {
     fn default() -> Self {
-        let bytes = 2 * MAX_GARMENT_VERTICES * BYTES_PER_VERTEX;
+        let bytes = 2 * MAX_DRAPED_VERTICES * BYTES_PER_VERTEX;
         let memory = MemoryBudget::new(KeptBytes { total: bytes, device: bytes });
         Self { met: Mutex::default(), kept: LruCache::new(&memory, Residence::Device) }
     }

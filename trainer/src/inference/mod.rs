@@ -62,7 +62,7 @@ pub use clothcombo_physics::contact::resolve::Certificate;
 pub use drape::{Drape, GarmentDrape};
 pub use draped::Draped;
 pub use draper::{Draper, DraperSettings};
-pub use embedded::MAX_GARMENT_VERTICES;
+pub use embedded::MAX_DRAPED_VERTICES;
 pub use motion::DrapeProgress;
 pub use names::UniqueNames;
 pub use outfit::{Outfit, OutfitGarment};

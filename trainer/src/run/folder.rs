@@ -240,8 +240,9 @@ fn io_error(path: &Path, reason: io::Error) -> RunDirError {
 /// # Errors
 /// The file system's.
 pub fn truncate_log(path: &Path, step: u64) -> io::Result<()> {
-    let text = match fs::read_to_string(path) {
-        Ok(text) => text,
+    // A kill may have cut a line within a letter.
+    let text = match fs::read(path) {
+        Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
         Err(e) => return Err(e),
     };
@@ -251,8 +252,7 @@ pub fn truncate_log(path: &Path, step: u64) -> io::Result<()> {
             .and_then(|v| v["step"].as_u64())
             .is_some_and(|s| s <= step && step > 0)
     };
-    let mut out: String = text.lines().filter(kept).flat_map(|l| [l, "\n"]).collect();
-    out.shrink_to_fit();
+    let out: String = text.lines().filter(kept).flat_map(|l| [l, "\n"]).collect();
     atomic::write(path, out.as_bytes())
 }
 

@@ -73,6 +73,10 @@ fn what_cannot_be_made_or_written_is_refused_at_once() {
             .code(2)
             .stderr(contains("thesis"));
     }
+    generate(&out, &["--start", &u64::MAX.to_string(), "--count", "1"])
+        .assert()
+        .code(1)
+        .stderr(contains("--start").and(contains("begin earlier")));
     let mut command = Command::cargo_bin("clothcombo").unwrap();
     command.args(["bench", "step", "--seconds", "0"]).assert().code(2).stderr(contains("--seconds"));
     assert!(!out.exists());

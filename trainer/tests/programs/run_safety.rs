@@ -41,6 +41,13 @@ fn a_second_run_in_the_same_folder() {
 }
 
 #[test]
+fn a_folder_without_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = trainer(1, &["--resume", "--run-dir"]).arg(folder.path()).output().unwrap();
+    assert_fails(&asked, 1, &["is not the folder of a run", "--config"]);
+}
+
+#[test]
 fn a_full_disk_during_a_save() {
     let folder = tempfile::tempdir().unwrap();
     let config = tiny(folder.path(), "");
