@@ -26,11 +26,13 @@ mod _native {
     use crate::model::{PyModel, PyOutfit};
     #[pymodule_export]
     use crate::scene::{PyScene, default_losses, evaluate_f32, evaluate_f64};
+    use clothcombo_physics::energy::Term;
     use pyo3::prelude::*;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         crate::call::listen_for_warnings();
+        module.add("TERMS", Term::ALL.map(Term::name))?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -17,8 +17,8 @@
 //!
 //! A ninth term is one new file, its name in [`Term`], its weight in the configuration, a bound of its gradient for the
 //! suite of degenerate cases, and one line where [`GarmentEnergies`] (or, for a pair of garments, [`SceneEnergy`])
-//! lists what it evaluates. A term that reads distances to the body is also named in `scene_sum.rs`. The
-//! finite-difference test walks the list.
+//! lists what it evaluates; `scene_sum.rs` names it with the terms of garments or of pairs, and whether it reads distances to
+//! the body. The compiler asks for all of these. The finite-difference test walks the list.
 
 pub mod bending;
 pub mod body_collision;

@@ -8,9 +8,7 @@ from . import _native
 from ._arrays import array, mesh, meshes, plain, positions as _positions, transforms as _rows
 from ._errors import Error
 
-TERMS = (
-    "strain", "bending", "gravity", "body_collision", "repulsion", "holding", "layer_collision", "layer_distance",
-)
+TERMS = tuple(_native.TERMS)
 
 
 def default_losses():

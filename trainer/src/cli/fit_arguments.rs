@@ -8,8 +8,12 @@ use clothcombo_data::format::FileError;
 use std::str::FromStr;
 use std::sync::Arc;
 
+/// Their group in the help.
+pub const HINTS: &str = "Hints about garment files";
+
 /// Hints about garment files; what is not given is found out.
 #[derive(Args, Clone, Debug)]
+#[command(next_help_heading = HINTS)]
 pub struct FitArguments {
     /// Unit of the file: m, dm, cm, mm, inch, foot or auto
     #[arg(long, default_value = "auto", value_parser = automatic::<Unit>)]
@@ -146,7 +150,8 @@ mod tests {
             (["--unit", "furlong"], "inch"),
             (["--keep", "inner"], "outer"),
             (["--offset", "1,2"], "three numbers"),
-            (["--offset", "nan,0,0"], "farther"),
+            (["--offset", "nan,0,0"], "three numbers"),
+            (["--offset", "1e9,0,0"], "farther"),
             (["--turn", "900"], "360"),
             (["--arms", "up"], "t, a"),
             (["--legs", "wide"], "60"),

@@ -25,6 +25,7 @@ enum LogFormat {
 
 /// How much is said.
 #[derive(Args, Clone, Copy, Debug, Default)]
+#[command(next_help_heading = "Messages")]
 pub struct Verbosity {
     /// No progress, only errors
     #[arg(long, short, global = true)]

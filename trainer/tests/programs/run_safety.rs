@@ -43,7 +43,8 @@ fn a_second_run_in_the_same_folder() {
 #[test]
 fn a_folder_without_a_run() {
     let folder = tempfile::tempdir().unwrap();
-    let asked = trainer(1, &["--resume", "--run-dir"]).arg(folder.path()).output().unwrap();
+    let run = folder.path().display().to_string();
+    let asked = trainer(1, &["--resume", "--run-dir", &run]).output().unwrap();
     assert_fails(&asked, 1, &["is not the folder of a run", "--config"]);
 }
 

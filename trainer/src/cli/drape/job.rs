@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// Shape, pose or motion of the body.
 #[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = super::BODY)]
 pub(super) struct SceneArguments {
     /// Shape parameters; missing ones are 0
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_name = "NUMBERS",
@@ -26,7 +27,7 @@ pub(super) struct SceneArguments {
     /// Frames of the motion: FIRST..END, FIRST.. or ..END, without END
     #[arg(long, value_name = "RANGE", requires = "moving")]
     pub frames: Option<FrameRange>,
-    /// Takes every so-manieth frame of the motion
+    /// Takes every Nth frame of the motion
     #[arg(long, value_name = "N", requires = "moving", value_parser = clap::value_parser!(u32).range(1..))]
     pub every: Option<u32>,
     /// A mesh of the posed body, with the vertices of the body model: the pose is recovered from it

@@ -7,7 +7,7 @@ mod outfits;
 mod summary;
 
 use crate::cli::device_argument::DeviceArgument;
-use crate::cli::fit_arguments::FitArguments;
+use crate::cli::fit_arguments::{FitArguments, HINTS};
 use crate::cli::output::print_json;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
@@ -30,6 +30,12 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
+// Groups of flags in the help.
+const GARMENTS: &str = "Garments";
+const BODY: &str = "Body and pose";
+const COMPUTATION: &str = "Networks, post-process, refinement";
+const OUTPUT: &str = "Output";
+
 /// Drapes garments on a body, innermost first: OBJ, GLB, picture, viewer and a report with a certificate
 #[derive(Parser)]
 #[command(group(ArgGroup::new("moving").args(["motion", "outfits"]).multiple(true)))]
@@ -48,72 +54,72 @@ use std::time::{Duration, Instant};
         [[outfit]]\n  name = \"monday\"\n  garments = [{ file = \"tee.obj\", unit = \"cm\" }, \"coat.obj\"]   # hints, or a name alone\n  # { file = \"coat.obj\", material = { thickness = 0.003 } } is of another material\n  shape = [1.0]       # optional, as are pose, \
         motion, frames, every")]
 pub struct Arguments {
-    /// Run, checkpoint folder or model.safetensors; default: the shipped model, which is part of the program
-    #[arg(long, value_name = "PATH")]
-    checkpoint: Option<PathBuf>,
-    /// Body: "mannequin" or a body npz; default: the one body in --dataset, else the one the model was trained on
-    #[arg(long, value_name = "BODY")]
-    body: Option<String>,
-    #[command(flatten)]
-    scene: job::SceneArguments,
     /// Garments, innermost first: mesh files or names
-    #[arg(long, num_args = 1.., value_name = "GARMENT", required_unless_present = "outfits", conflicts_with = "outfits")]
+    #[arg(help_heading = GARMENTS, long, num_args = 1.., value_name = "GARMENT", required_unless_present = "outfits", conflicts_with = "outfits")]
     garments: Vec<String>,
     /// Drapes the garments in another order: their numbers from 0, innermost first
-    #[arg(long, value_delimiter = ',', value_name = "NUMBERS", conflicts_with = "outfits")]
+    #[arg(help_heading = GARMENTS, long, value_delimiter = ',', value_name = "NUMBERS", conflicts_with = "outfits")]
     order: Option<Vec<usize>>,
     /// Several outfits in one process, from a TOML file; each garment is embedded once
-    #[arg(long, value_name = "FILE")]
+    #[arg(help_heading = GARMENTS, long, value_name = "FILE")]
     outfits: Option<PathBuf>,
     /// Folder whose garments may be named, those in folders within it too; repeatable
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(help_heading = GARMENTS, long, value_name = "FOLDER")]
     dataset: Vec<PathBuf>,
-    /// Whether mesh files are fitted to the body
-    #[arg(long, value_enum, default_value_t = Fit::Auto)]
-    fit: Fit,
-    #[command(flatten)]
-    hints: FitArguments,
     /// What the garments are made of, where that is not what the model was trained on: of thickness (m), density (kg/m³),
     /// lambda, mu (Pa) and bending_stiffness (J/rad²). The refinement knows it all; of it the networks see how thick the
     /// garments below are, and the post-process measures strain by it.
     /// Example: --material thickness=0.003,density=150
-    #[arg(long, value_name = "KEY=VALUE,…", value_parser = GarmentMaterial::from_str)]
+    #[arg(help_heading = GARMENTS, long, value_name = "KEY=VALUE,…", value_parser = GarmentMaterial::from_str)]
     material: Option<GarmentMaterial>,
+    /// Body: "mannequin" or a body npz; default: the one body in --dataset, else the one the model was trained on
+    #[arg(help_heading = BODY, long, value_name = "BODY")]
+    body: Option<String>,
+    #[command(flatten)]
+    scene: job::SceneArguments,
+    /// Whether mesh files are fitted to the body
+    #[arg(help_heading = HINTS, long, value_enum, default_value_t = Fit::Auto)]
+    fit: Fit,
+    #[command(flatten)]
+    hints: FitArguments,
+    /// Run, checkpoint folder or model.safetensors; default: the shipped model, which is part of the program
+    #[arg(help_heading = COMPUTATION, long, value_name = "PATH")]
+    checkpoint: Option<PathBuf>,
+    #[command(flatten, next_help_heading = COMPUTATION)]
+    device: DeviceArgument,
+    /// Leaves out the post-process; the certificate still counts everything
+    #[arg(help_heading = COMPUTATION, long, conflicts_with_all = ["gap_mm", "time_limit"])]
+    no_resolve: bool,
+    #[command(flatten, next_help_heading = COMPUTATION)]
+    post_process: PostProcessArguments,
     /// Steps of the static solver after networks and post-process that make no intersection, at most 2 cm each, until a vertex
     /// is 5 cm from there: at most 1000, 0 for none; `auto`: until a step gains less than 1 % of what all did, for at most two
     /// seconds [default: 4 for one pose, 0 for a motion]
-    #[arg(long, value_name = "STEPS|auto")]
+    #[arg(help_heading = COMPUTATION, long, value_name = "STEPS|auto")]
     refine: Option<RefineSteps>,
-    /// Leaves out the post-process; the certificate still counts everything
-    #[arg(long, conflicts_with_all = ["gap_mm", "time_limit"])]
-    no_resolve: bool,
-    #[command(flatten)]
-    post_process: PostProcessArguments,
     /// Smooths a motion over this many frames to each side, before the post-process and, where that makes no
     /// intersection, after it; 0 takes every frame as it is [default: 2 for frames at most 0.05 s apart, else 0]
-    #[arg(long, num_args = 0..=1, default_missing_value = "2", value_name = "FRAMES",
+    #[arg(help_heading = COMPUTATION, long, num_args = 0..=1, default_missing_value = "2", value_name = "FRAMES",
           value_parser = clap::value_parser!(u16).range(..=i64::from(MOST_RADIUS)))]
     smooth: Option<u16>,
     /// Folder that keeps embeddings between runs; default: clothcombo in the user's cache folder
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(help_heading = COMPUTATION, long, value_name = "FOLDER")]
     cache: Option<PathBuf>,
     /// Keeps nothing between runs
-    #[arg(long, conflicts_with = "cache")]
+    #[arg(help_heading = COMPUTATION, long, conflicts_with = "cache")]
     no_cache: bool,
+    /// Folder to make
+    #[arg(help_heading = OUTPUT, short, long, value_name = "FOLDER")]
+    output: PathBuf,
     /// Writes OBJ files of every frame of a motion, not only of the first
-    #[arg(long, requires = "moving")]
+    #[arg(help_heading = OUTPUT, long, requires = "moving")]
     all_frames: bool,
     /// Replaces the folder of an earlier drape
-    #[arg(long)]
+    #[arg(help_heading = OUTPUT, long)]
     replace: bool,
     /// Prints the report as JSON instead of tables
-    #[arg(long)]
+    #[arg(help_heading = OUTPUT, long)]
     json: bool,
-    #[command(flatten)]
-    device: DeviceArgument,
-    /// Folder to make
-    #[arg(short, long, value_name = "FOLDER")]
-    output: PathBuf,
 }
 
 impl Arguments {

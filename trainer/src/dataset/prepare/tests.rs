@@ -22,7 +22,7 @@ fn patch(preprocessor: &Preprocessor, joints: &ActiveJoints, low: f64) -> Arc<Pr
 fn distant_garments_are_a_pair_in_the_full_graph_only() {
     let losses = LossesConfig::default();
     let body = Arc::new(mannequin());
-    let text = "[[data.garments]]\ngenerate = { count = 2, seed = 0 }\n[[stages]]\nname = \"single\"\ntrains = \"single\"\nsteps = 1\n";
+    let text = "seed = 0\n[[data.garments]]\ngenerate = { count = 2, seed = 0 }\n[[stages]]\nname = \"single\"\ntrains = \"single\"\nsteps = 1\n";
     let config = parse(text, Path::new("patches.toml"), &[]).unwrap();
     let preprocessor = Preprocessor::new(&config, body.clone());
     let joints = ActiveJoints::named(&body, &body.joint_names).unwrap();
