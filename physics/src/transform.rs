@@ -9,11 +9,13 @@ pub type Transform = [[f64; 4]; 3];
 pub const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 /// `A p + t`.
+#[inline]
 pub fn apply(transform: &Transform, p: [f64; 3]) -> [f64; 3] {
     transform.map(|[a, b, c, d]| a * p[0] + b * p[1] + c * p[2] + d)
 }
 
 /// `A v`.
+#[inline]
 pub fn apply_linear(transform: &Transform, v: [f64; 3]) -> [f64; 3] {
     transform.map(|[a, b, c, _]| a * v[0] + b * v[1] + c * v[2])
 }

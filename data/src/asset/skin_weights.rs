@@ -62,6 +62,7 @@ impl SparseSkinWeights {
     ///
     /// # Panics
     /// As [`Self::row`].
+    #[inline]
     pub fn of_vertex(&self, vertex: usize) -> impl Iterator<Item = (usize, f32)> {
         let (joints, weights) = self.row(vertex);
         joints.iter().zip(weights).map(|(joint, weight)| (usize::from(*joint), *weight))

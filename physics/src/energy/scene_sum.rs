@@ -167,10 +167,11 @@ impl<T: Real> SceneEnergy<T> {
                 value
             })
             .collect();
-        let mut posed_gradient: Vec<[T; 3]> =
-            garments.iter().flat_map(|value| value.posed.iter().flatten()).copied().collect();
-        let canonical_gradient =
-            garments.iter().flat_map(|value| value.canonical.iter().flatten()).copied().collect();
+        let joined = |of: fn(&GarmentValue<T>) -> &Option<Vec<[T; 3]>>| {
+            garments.iter().filter_map(|value| of(value).as_deref()).collect::<Vec<_>>().concat()
+        };
+        let mut posed_gradient = joined(|value| &value.posed);
+        let canonical_gradient = joined(|value| &value.canonical);
 
         let pairs: Vec<PairValue<T>> =
             self.layers.par_iter().map(|pair| self.pair(pair, &shared, is_active, with_gradient)).collect();
