@@ -12,7 +12,6 @@ use std::path::{Path, PathBuf};
 
 /// Shape, pose or motion of the body.
 #[derive(Args, Clone, Debug, Default)]
-#[command(next_help_heading = super::BODY)]
 pub(super) struct SceneArguments {
     /// Shape parameters; missing ones are 0
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_name = "NUMBERS",

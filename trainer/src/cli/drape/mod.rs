@@ -75,7 +75,7 @@ pub struct Arguments {
     /// Body: "mannequin" or a body npz; default: the one body in --dataset, else the one the model was trained on
     #[arg(help_heading = BODY, long, value_name = "BODY")]
     body: Option<String>,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = BODY)]
     scene: job::SceneArguments,
     /// Whether mesh files are fitted to the body
     #[arg(help_heading = HINTS, long, value_enum, default_value_t = Fit::Auto)]
