@@ -2,6 +2,7 @@
 
 use super::{FitSettings, Keep, SourceBody, Unit, UpAxis};
 use crate::asset::{Category, GarmentMaterial};
+use clothcombo_physics::vec3::is_finite;
 use serde::Deserialize;
 use std::fmt::Display;
 use std::str::FromStr;
@@ -107,18 +108,21 @@ impl FromStr for Arms {
 /// # Errors
 /// When they are not, or are out of reach.
 pub fn offset(text: &str) -> Result<[f64; 3], String> {
-    let wrong = || format!("'{text}' is not three numbers in metres such as 0,0.95,0");
+    let wrong = || no_offset(text);
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
     let numbers: [f64; 3] = numbers.map_err(|_| wrong())?.try_into().map_err(|_| wrong())?;
-    match numbers.iter().all(|x| x.is_finite()) {
-        true => within_reach(numbers, text),
-        false => Err(wrong()),
-    }
+    within_reach(numbers, text)
+}
+
+fn no_offset(text: impl Display) -> String {
+    format!("'{text}' is not three numbers in metres such as 0,0.95,0")
 }
 
 /// `numbers` (m), called `text`.
 fn within_reach(numbers: [f64; 3], text: impl Display) -> Result<[f64; 3], String> {
-    // Neither is what is no number.
+    if !is_finite(numbers) {
+        return Err(no_offset(text));
+    }
     match numbers.iter().all(|x| x.abs() <= FARTHEST_ORIGIN) {
         true => Ok(numbers),
         false => Err(format!("'{text}' is farther from the body than {FARTHEST_ORIGIN} m")),

@@ -60,6 +60,9 @@ pub(super) fn write_retargeted(
     }
     let inputs = named(files.iter().map(|f| (f.clone(), stem(f))));
     let import = |file: &Path| {
+        if file.is_dir() {
+            return Err("a folder; name the files in it".into());
+        }
         let Retargeted { poses, frame_rate, skeleton, remark } =
             retarget(file).map_err(|e| short(&e, file))?;
         let warnings = [impossible_turn(&poses), not_upright(&poses)];
@@ -130,11 +133,7 @@ pub(super) fn write_motions(
     let mut summary = Summary::default();
     let (mut done, mut frames, mut seconds) = (0, 0, 0.0);
     for chunk in inputs.chunks(16) {
-        let import = |input: &NamedFile| match input.path.is_dir() {
-            true => Err("a folder; name the files in it".to_owned()),
-            false => import(&input.path),
-        };
-        let clips: Vec<_> = chunk.par_iter().map(import).collect();
+        let clips: Vec<_> = chunk.par_iter().map(|input| import(&input.path)).collect();
         for (NamedFile { path, name }, clip) in chunk.iter().zip(clips) {
             done += 1;
             progress("importing motions", done, inputs.len());

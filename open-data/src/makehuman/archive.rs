@@ -7,7 +7,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 use tar::Archive;
 
-/// Larger files are no proxies (bytes).
+/// No proxy is larger (bytes): a compressed file can unfold to any size.
 const LARGEST_PROXY: u64 = 64 << 20;
 
 /// Whether a path in the package is a clothing proxy: `…/proxies/clothes/<name>/<name>.json`.
@@ -39,13 +39,17 @@ fn from_tarball(package: &Path) -> std::io::Result<Vec<(String, Vec<u8>)>> {
     let mut archive = Archive::new(GzDecoder::new(BufReader::new(File::open(package)?)));
     let mut proxies = Vec::new();
     for entry in archive.entries()? {
-        let entry = entry?;
+        let mut entry = entry?;
         let path = entry.path()?.into_owned();
-        if is_proxy(&path) && entry.size() < LARGEST_PROXY {
-            let mut bytes = Vec::new();
-            entry.take(LARGEST_PROXY).read_to_end(&mut bytes)?;
-            proxies.push((stem(&path), bytes));
+        if !is_proxy(&path) {
+            continue;
         }
+        if entry.size() > LARGEST_PROXY {
+            return Err(std::io::Error::other(format!("{} has {} bytes", path.display(), entry.size())));
+        }
+        let mut bytes = Vec::new();
+        entry.read_to_end(&mut bytes)?;
+        proxies.push((stem(&path), bytes));
     }
     Ok(proxies)
 }

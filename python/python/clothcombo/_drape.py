@@ -92,8 +92,9 @@ class Outfit:
 
         `shape`: parameters. `pose`: rotation vectors [J, 3] (radians), a name, or FILE.npz:FRAME; `motion`: a file, or (poses
         [T, J, 3], frames per second), of which `frames` (first, end) and `every` take a part; `posed`: the vertices [B, 3] of
-        the posed body, whose shape is `shape` or that of the vertices `t_pose`. `refine` (at most 1000 steps or "auto"; by default 4 for one
-        pose, 0 for a motion), `resolve`, `gap_mm`, `time_limit` (s for a garment) and `smooth` (frames) are the flags of that name.
+        the posed body, whose shape is `shape` or that of the vertices `t_pose`. `refine` (at most 1000 steps or "auto"; by
+        default 4 for one pose, 0 for a motion), `resolve`, `gap_mm`, `time_limit` (s for a garment) and `smooth` (frames) are the
+        flags of that name.
         """
         if sum(x is not None for x in (pose, motion, posed)) > 1 or (t_pose is not None and posed is None):
             raise Error("more than one of pose, motion and posed, or t_pose without posed; hint: give one body")

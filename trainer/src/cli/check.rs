@@ -63,7 +63,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     match unusable.is_empty() {
         true => Ok(()),
         false => Err(miette!(
-            help = "`clothcombo fit` repairs garments; other files that exist must be exported or downloaded again",
+            help =
+                "`clothcombo fit` repairs garments; other files must be found, exported or downloaded again",
             "{} of {} files are unusable\n{}",
             unusable.len(),
             files.len(),

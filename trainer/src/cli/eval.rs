@@ -12,11 +12,11 @@ use crate::inference::shipped_model;
 use crate::run::checkpoint::TrainedModel;
 use crate::run::report::html::utc;
 use crate::system::device::name;
-use crate::system::files::{check_writable, write_file, write_json};
+use crate::system::files::{write_file, write_json};
 use burn::tensor::Device;
 use clap::Parser;
 use clap::builder::PossibleValuesParser;
-use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use miette::{Report, WrapErr, miette};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -106,8 +106,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let specific = named_models(arguments, "--specific", &arguments.specific, &model, &device)?;
     check_specific(&specific, &model.dataset)?;
     check_ablations(&ablations, &model)?;
-    // Now, not after all the work; nothing is made before that.
-    check_writable(folder).into_diagnostic().wrap_err_with(|| format!("{}", folder.display()))?;
 
     let asks_for_certificates = arguments.only.iter().any(|part| part == "certificates");
     let outfits = arguments.outfits.map_or(if asks_for_certificates { OUTFITS } else { 0 }, usize::from);
@@ -182,13 +180,15 @@ fn named_models(
     first: &ModelUnderTest,
     device: &Device,
 ) -> Result<Vec<NamedModel>, Report> {
-    let named_model = |(name, path): &(String, PathBuf)| {
-        let trained = TrainedModel::open(path).wrap_err_with(|| format!("{flag} \"{name}\""))?;
+    let opened = |path: &Path| {
+        let trained = TrainedModel::open(path)?;
         let mut config = trained.config.clone();
         config.losses = first.config.losses.clone();
         config.validation.seed = Some(first.config.validation_seed());
-        let model =
-            model(arguments, &trained, config, device).wrap_err_with(|| format!("{flag} \"{name}\""))?;
+        model(arguments, &trained, config, device)
+    };
+    let named_model = |(name, path): &(String, PathBuf)| {
+        let model = opened(path).wrap_err_with(|| format!("{flag} \"{name}\""))?;
         Ok(NamedModel { name: name.clone(), model })
     };
     named.iter().map(named_model).collect()

@@ -3,10 +3,10 @@
 use super::garment_sheet::{PER_CATEGORY, garment_sheet};
 use crate::cli::values::{count, folder_to_make, picture_file};
 use crate::cli::verbosity::{print_status, progress_bar};
+use crate::config::MOST_GENERATED_GARMENTS;
 use crate::dataset::load_body;
 use crate::picture::save_png;
-use crate::system::files::check_writable;
-use clap::Parser;
+use clap::{Parser, value_parser};
 use clothcombo_data::asset::{Body, Category, Garment};
 use clothcombo_data::folders::{ManifestEntry, read_manifest, refuse_unlisted, save_garment, save_manifest};
 use clothcombo_data::format::obj;
@@ -16,6 +16,9 @@ use rayon::prelude::*;
 use std::collections::HashSet;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
+
+/// From here on every garment that may be asked for has a number.
+const LAST_START: u64 = u64::MAX - MOST_GENERATED_GARMENTS as u64;
 
 /// Makes garments that fit a body: OBJ files with a garments.toml
 #[derive(Parser)]
@@ -30,7 +33,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 12, value_parser = count)]
     count: usize,
     /// Number of the first garment: makes garments START to START + COUNT - 1
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = value_parser!(u64).range(..=LAST_START))]
     start: u64,
     /// First seed; garment i uses seed + i
     #[arg(long, default_value_t = 0)]
@@ -60,19 +63,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let body = load_body(&arguments.body, 0)?;
     let maker = GarmentMaker::new(arguments, &body)?;
-    let count = arguments.count as u64;
-    if arguments.start.checked_add(count).is_none() {
-        return Err(miette!(
-            help = format!("numbers of garments end at {}: begin earlier", u64::MAX),
-            "--start {} leaves no numbers for {count} garments",
-            arguments.start
-        ));
-    }
-    let wanted: Vec<WantedFile> = (0..count).map(|i| maker.wanted(arguments, i)).collect();
+    let wanted: Vec<WantedFile> = (0..arguments.count as u64).map(|i| maker.wanted(arguments, i)).collect();
     let folder = &arguments.output;
-    if let Some(path) = &arguments.picture {
-        check_writable(path).into_diagnostic().wrap_err_with(|| format!("--picture {}", path.display()))?;
-    }
     // Before anything is made: a folder that holds other garments stays as it is.
     wanted.iter().try_for_each(|garment| maker.check(garment))?;
     refuse_unlisted(folder, &wanted.iter().map(|g| g.path.clone()).collect()).into_diagnostic()?;

@@ -95,15 +95,13 @@ impl Arguments {
         match (&self.config, run, &self.resume) {
             (Some(file), _, _) => Ok(file.clone()),
             (None, Some(run), Some(_)) => {
-                let file = run.join("config.toml");
-                match file.exists() {
-                    true => Ok(file),
-                    false => Err(miette!(
+                Some(run.join("config.toml")).filter(|file| file.exists()).ok_or_else(|| {
+                    miette!(
                         help = "leave --resume out to start a run there, with --config",
                         "{} is not the folder of a run: it holds no config.toml",
                         run.display()
-                    )),
-                }
+                    )
+                })
             }
             _ => Err(miette!(help = "for example --config configs/smoke.toml", "no configuration was given")),
         }

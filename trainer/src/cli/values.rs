@@ -2,10 +2,11 @@
 
 use crate::config::MOST_GENERATED_GARMENTS;
 use crate::inference::MOST_SHAPE;
+use crate::system::files::check_writable;
 use crate::system::paths::obstacle;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clothcombo_physics::contact::resolve::ResolveSettings;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// A whole number that is at least 1.
@@ -81,10 +82,7 @@ pub fn picture_file() -> impl TypedValueParser<Value = PathBuf> {
 
 /// A folder that is there or can be made.
 pub fn folder_to_make() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(|path| match obstacle(&path) {
-        Some(file) => Err(format!("{} is a file, not a folder", file.display())),
-        None => Ok(path),
-    })
+    PathBufValueParser::new().try_map(|path| makeable(&path).map(|()| path))
 }
 
 /// A file that is there or can be made.
@@ -96,9 +94,14 @@ fn checked_file(path: PathBuf) -> Result<PathBuf, String> {
     if path.is_dir() {
         return Err("it is a folder, not a file".into());
     }
-    match path.parent().and_then(obstacle) {
-        Some(other) => Err(format!("{} is a file, not a folder", other.display())),
-        None => Ok(path),
+    makeable(path.parent().unwrap_or(Path::new(""))).map(|()| path)
+}
+
+/// Whether files can be made in a folder, which need not be there.
+fn makeable(folder: &Path) -> Result<(), String> {
+    match obstacle(folder) {
+        Some(file) => Err(format!("{} is a file, not a folder", file.display())),
+        None => check_writable(folder).map_err(|e| format!("nothing can be written there: {e}")),
     }
 }
 

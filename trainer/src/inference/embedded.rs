@@ -9,7 +9,7 @@ use clothcombo_physics::contact::resolve::RestGarment;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Most vertices of a garment: at the paper's sizes the operators of one take 2 kB a vertex, its embedding as much.
+/// Most vertices of a garment that is draped: at the paper's sizes the operators of one take 2 kB a vertex, its embedding as much.
 pub const MAX_DRAPED_VERTICES: usize = 100_000;
 /// Memory of a vertex of a garment at the paper's sizes (bytes): 2 kB are operators, as much the embedding.
 const BYTES_PER_VERTEX: usize = 4096;

@@ -240,20 +240,20 @@ fn io_error(path: &Path, reason: io::Error) -> RunDirError {
 /// # Errors
 /// The file system's.
 pub fn truncate_log(path: &Path, step: u64) -> io::Result<()> {
-    // A kill may have cut a line within a letter.
-    let text = match fs::read(path) {
-        Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
+    // Bytes: a kill may have cut a line within a letter.
+    let log = match fs::read(path) {
+        Ok(log) => log,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
         Err(e) => return Err(e),
     };
-    let kept = |line: &&str| {
-        serde_json::from_str::<serde_json::Value>(line)
+    let kept = |line: &&[u8]| {
+        serde_json::from_slice::<serde_json::Value>(line)
             .ok()
             .and_then(|v| v["step"].as_u64())
             .is_some_and(|s| s <= step && step > 0)
     };
-    let out: String = text.lines().filter(kept).flat_map(|l| [l, "\n"]).collect();
-    atomic::write(path, out.as_bytes())
+    let lines = log.split(|byte| *byte == b'\n').filter(kept);
+    atomic::write(path, &lines.flat_map(|line| [line, b"\n"]).collect::<Vec<_>>().concat())
 }
 
 #[cfg(test)]
@@ -315,6 +315,22 @@ mod tests {
         assert!(run.adopt_config(&changed).unwrap().is_empty());
         assert_eq!(load(&run.config(), &[]).unwrap().output.keep_checkpoints, 4);
         assert!(!folder.path().join("config.before-2.toml").exists());
+    }
+
+    #[test]
+    fn a_log_that_was_cut_within_a_letter_is_truncated() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("metrics.jsonl");
+        let cut = "{\"step\":3,\"name\":\"é".as_bytes();
+        let whole = b"{\"step\":1}\n{\"step\":2}\n";
+        fs::write(&log, [whole, &cut[..cut.len() - 1]].concat()).unwrap();
+        truncate_log(&log, 3).unwrap();
+        assert_eq!(fs::read(&log).unwrap(), whole);
+        truncate_log(&log, 1).unwrap();
+        assert_eq!(fs::read(&log).unwrap(), b"{\"step\":1}\n");
+        truncate_log(&log, 0).unwrap();
+        assert!(fs::read(&log).unwrap().is_empty());
+        truncate_log(&folder.path().join("none"), 1).unwrap();
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Report> {
     write_file(path, &serde_json::to_vec_pretty(value).into_diagnostic()?)
 }
 
-/// Whether files can be made in `folder`, or a file where none is yet: tried in the innermost folder that is, where nothing is left.
+/// Whether files can be made in `folder`, which need not be there: tried in the innermost folder that is, where nothing is left.
 ///
 /// # Errors
 /// What the system says.

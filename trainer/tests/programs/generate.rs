@@ -75,8 +75,17 @@ fn what_cannot_be_made_or_written_is_refused_at_once() {
     }
     generate(&out, &["--start", &u64::MAX.to_string(), "--count", "1"])
         .assert()
-        .code(1)
-        .stderr(contains("--start").and(contains("begin earlier")));
+        .code(2)
+        .stderr(contains("--start"));
+    // No folder can be made there, whoever asks.
+    for refused in [["-o", "/proc/clothcombo"], ["--picture", "/proc/clothcombo/sheet.png"]] {
+        let mut command = Command::cargo_bin("clothcombo").unwrap();
+        command.args(["generate", "--count", "1"]).args(refused);
+        if refused[0] != "-o" {
+            command.arg("-o").arg(&out);
+        }
+        command.assert().code(2).stderr(contains(refused[0]).and(contains("/proc/clothcombo")));
+    }
     let mut command = Command::cargo_bin("clothcombo").unwrap();
     command.args(["bench", "step", "--seconds", "0"]).assert().code(2).stderr(contains("--seconds"));
     assert!(!out.exists());

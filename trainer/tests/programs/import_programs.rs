@@ -100,6 +100,7 @@ fn mistakes_are_one_sentence_and_an_exit_code() {
         ("deepmimic", "deepmimic/dog.txt", "frame 0 has 8 numbers"),
         ("amc", "amass/CMU/LICENSE.txt", "no skeleton (.asf) beside it"),
         ("bvh", "acclaim/07/07_01.amc", "`clothcombo import amc` reads it"),
+        ("bvh", "acclaim", "a folder; name the files in it"),
     ] {
         let mut command = import(verb);
         let output = command.env("NO_COLOR", "1").arg(fixture(input)).arg("-o").arg(&out).output().unwrap();

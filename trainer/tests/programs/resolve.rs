@@ -272,7 +272,7 @@ fn nothing_is_written_over() {
     let case = Case::new();
     let before = fs::read(case.path("tee.obj")).unwrap();
     case.must_fail(&["tee.obj"], &["-o", "."], &["names no new folder"]);
-    case.must_fail(&["tee.obj"], &["-o", "../work/..", "--replace"], &["names no new folder"]);
+    case.must_fail(&["tee.obj"], &["-o", "../elsewhere/..", "--replace"], &["names no new folder"]);
     case.command(&["tee.obj"], &["-o", "out"]).assert().success();
     case.must_fail(&["coat.obj"], &["-o", "out"], &["out is there", "--replace"]);
     case.must_fail(&["out/tee.obj"], &["-o", "out", "--replace"], &["out/tee.obj in it is read"]);

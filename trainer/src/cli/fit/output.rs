@@ -1,12 +1,11 @@
 //! What `clothcombo fit` writes.
 
-use crate::system::files::check_writable;
 use clothcombo_data::fit::{Fitted, SourceBody};
 use clothcombo_data::format::obj::{MovedObj, RepairedForm, save_file_faces};
 use clothcombo_data::format::{
     FileError, FileFace, MeshFormat, PolygonMesh, atomic, obj, parse_mesh, read_mesh_file,
 };
-use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use miette::{IntoDiagnostic, Report, miette};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -39,9 +38,6 @@ pub(super) fn check_output(
         let help = format!("for example -o {}", output.with_extension("obj").display());
         return Err(miette!(help = help, "{}: the fitted garment is written as .obj", output.display()));
     }
-    check_writable(output)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot write {}", output.display()))?;
     let place = fs::canonicalize(output).ok();
     let is_same = |path: &Path| place.is_some() && fs::canonicalize(path).ok() == place;
     let what = match from_body {
